@@ -1,4 +1,4 @@
-"""How near planned motion is to the least time of its path, beside toppra and beside LinuxCNC's planner.
+"""How near planned motion is to the least time of its path, beside toppra, an optimum with jerk, and LinuxCNC.
 
 The times are of the motion and the same on every computer; LinuxCNC's are counted in its servo periods.
 """
@@ -64,7 +64,11 @@ def run(peer_python: str = sys.executable) -> list[Figure]:
         on_lines, in_blends = (seconds / least_with_jerk(f, u, limits, T, corners) for corners in (False, True))
         figures.append(Figure(f"{name}: planned / least time, with jerk on its lines", "", (on_lines,)))
         figures.append(Figure(f"{name}: planned / the same, blends at constant speed", "", (in_blends,)))
-        theirs = _toppra(kept, limits, peer_python)
+        optimum = _peer("jerk_optimum_peer", kept, limits, peer_python)
+        note = optimum if isinstance(optimum, str) else f"{optimum:.3f} s"
+        runs = () if isinstance(optimum, str) else (seconds / optimum,)
+        figures.append(Figure(f"{name}: planned / optimum with jerk, by collocation", "", runs, note=note))
+        theirs = _peer("toppra_peer", kept, limits, peer_python)
         note = theirs if isinstance(theirs, str) else f"{theirs:.3f} s"
         runs = () if isinstance(theirs, str) else (max(theirs / kept.seconds, kept.seconds / theirs),)
         figures.append(Figure(f"{name}: toppra's least time and ours, apart", "×", runs, SLOWER, note))
@@ -100,8 +104,8 @@ def _peaks(certificate: Certificate) -> list[tuple[str, float]]:
     return list(shares.items())
 
 
-def _toppra(kept: _Kept, limits: Limits, python: str) -> float | str:
-    """Seconds on the same path, or why there is none."""
+def _peer(module: str, kept: _Kept, limits: Limits, python: str) -> float | str:
+    """Seconds on the same path by a module of benchmarks in its own process, or why there are none."""
     f, u = (np.concatenate(column) for column in zip(*kept.pieces, strict=True))
     rows, counts = intervals(f, u, limits.velocity, limits.acceleration, T)
     edges: list[np.ndarray] = []
@@ -118,8 +122,9 @@ def _toppra(kept: _Kept, limits: Limits, python: str) -> float | str:
             axes=limits.present,
             velocity=limits.velocity,
             acceleration=limits.acceleration,
+            jerk=limits.jerk,
         )
-        words = [python, "-m", "benchmarks.toppra_peer", str(file)]
+        words = [python, "-m", f"benchmarks.{module}", str(file)]
         done = subprocess.run(words, cwd=Path(__file__).parents[1], capture_output=True, text=True)
     if done.returncode:
         return f"skipped: {(done.stderr.strip().splitlines() or ['ended without a word'])[-1]}"

@@ -175,7 +175,7 @@ def plot(
         from rds.nc.tool_centre import shown
         from rds.nc.trace import Trace
 
-        path = out or file.with_name(f"{file.stem}-path.png")
+        path = out or file.parent / f"{file.stem}-path.png"
         of = load_machine(machine)
         what = setup(tools, parameters, with_, max_jumps).on(of, file)
         validator = validator_of(file, of, what)

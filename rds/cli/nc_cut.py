@@ -69,7 +69,7 @@ def cut(
 
         if library.suffix.lower() != ".toml":
             raise InputError("is no tool library; a cut needs the shapes of the tools, in a .toml file", str(library))
-        path = out or file.with_name(f"{file.stem}-cut.png")
+        path = out or file.parent / f"{file.stem}-cut.png"
         of, what = load_machine(machine), setup(library, parameters, with_, max_jumps)
         tools = {tool.number: tool for tool in read_library(library)}
         with progress_bars() as bar:

@@ -246,8 +246,11 @@ def followed(items: Iterable[Item], program: Path, progress: Progress | None) ->
     if progress is None:
         yield from items
         return
-    with program.open("rb") as stream:
-        lines = sum(chunk.count(b"\n") for chunk in iter(lambda: stream.read(1 << 20), b""))
+    try:
+        with program.open("rb") as stream:
+            lines = sum(chunk.count(b"\n") for chunk in iter(lambda: stream.read(1 << 20), b""))
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror}); check the path", str(program)) from error
     seen = 0
     for item in items:
         line = int(item.rows["line"][-1]) if isinstance(item, MotionBlock) and len(item) else getattr(item, "line", 0)

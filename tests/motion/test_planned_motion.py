@@ -363,6 +363,26 @@ def test_a_right_angle_is_passed_at_the_jerk_limited_optimum() -> None:
     assert 0.95 * 0.05 < away <= 0.05
 
 
+@pytest.mark.parametrize(("turn", "saves"), [(90.0, 0.015), (130.0, 0.02)])
+def test_the_way_through_a_corner_is_sped_up_within_its_blend(turn: float, saves: float) -> None:
+    """It takes less than at the highest even speed √(a d / |t₁ − t₀|) over the blend, from one S-curve to the other."""
+    F, a, j, P = 10.0, 200.0, 10000.0, 0.02
+    limits = Limits(np.r_[[13.0] * 3, [0.0] * 3], np.r_[[a] * 3, [0.0] * 3], np.r_[[j] * 3, [0.0] * 3])
+    here, there = np.array([2 * 0.5**0.5, 2 * 0.5**0.5]), np.radians(45.0 + turn) + np.array([0.0, -pi / 2])
+    path = [(0.0, 0.0), tuple(here), tuple(here + 2.0 * np.cos(there))]
+    certificate = Certificate(limits)
+    blocks = list(certified(plan([polygon(path, F, mode=BLEND, tolerance=P)], limits, T), certificate))
+    assert certificate.ok, certificate.violations
+    half = 6 * 0.999 * P / np.sin(np.radians(turn))
+    change = np.abs(np.cos(there) - 0.5**0.5).max()
+    even = (a * half / change) ** 0.5
+    along = [1 / 0.5**0.5, 1 / np.abs(np.cos(there)).max()]  # of acceleration and jerk, that a line has
+    ramps = [[((F - v) / (a * k) + a / j, 0.5 * (F + v)) for v in (0.0, even)] for k in along]
+    took = sum(2.0 / F + sum(t * (1.0 - v / F) for t, v in ramp) for ramp in ramps)
+    took += 2.0 * half * (1.0 / even - 1.0 / F)
+    assert sum(map(len, blocks)) * T < took - saves
+
+
 def test_the_tolerance_is_measured_to_the_path_at_a_sharp_turn() -> None:
     _, away = _passed([(0, 0), (20, 0), (10, 10)], 2.0, 0.05)
     assert 0.9 * 0.05 < away <= 0.05

@@ -218,8 +218,11 @@ def test_what_cannot_be_read_is_refused(folder: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("check", "none.ngc"), "none.ngc"),
-        (("check", "."), "cannot be read"),
+        *(
+            ((name, file), f"rds: {file}: cannot be read ({why}); check the path")
+            for name in ("check", "canon", "time", "plot", "step")
+            for file, why in (("none.ngc", "No such file or directory"), (".", "Is a directory"))
+        ),
         (("check", "part.ngc", "--machine", "none"), "there is no machine 'none'"),
         (("check", "part.ngc", "--tools", "none.tbl"), "none.tbl"),
         (("check", "part.ngc", "--parameters", "none.var"), "none.var"),

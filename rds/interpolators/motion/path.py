@@ -52,6 +52,7 @@ SHARP = -0.866  # cosine of the turn (150°) from which a corner in mode BLEND i
 MOST_JOINED = 64  # lines
 TURN_SHARE = 0.3  # of the jerk, for changes of direction at joints on an exact path
 STOP_SHARE = 0.05  # of the feed: where a joint allows less, stopping costs no more time
+LOST = 0.65  # at most, at turns of 40° to 145° on machines whose acceleration limits c: 0.25 to 0.66
 EXACT_STOP, BLEND, LINE = 1, 2, -1  # as in segments.py
 
 
@@ -162,7 +163,8 @@ def _stopping_is_faster(b, f, g, d0, d1, acceleration, jerk, tau, work):
     """Whether a rest at the corner of pieces f and g takes less time than the blend b, as far as both can be told here.
 
     With v the speed before and after it, a the acceleration along the lines, c the speed in the blend of length h and
-    r = min(τ, √(v/j)) the ramp of the acceleration, passing costs (v − c)²/(v a) + (r + h/c)(1 − c/v), resting v/a + r.
+    r = min(τ, √(v/j)) the ramp of the acceleration, passing costs (v − c)²/(v a) + (r + s h/c)(1 − c/v), resting
+    v/a + r. The share s is what is lost in the blend of what an even speed in it would lose (corners.py).
     """
     bound(b, BLENDED, 0, 1, work[8, :6], work[9, :6], work[10, :6])
     a = j = inf
@@ -180,7 +182,7 @@ def _stopping_is_faster(b, f, g, d0, d1, acceleration, jerk, tau, work):
         return False
     ramp = min(tau, sqrt(v / j))
     length = 2.0 * b[LENGTH]  # of both halves
-    return (v - c) ** 2 / (v * a) + (ramp + length / c) * (1.0 - c / v) > v / a + ramp
+    return (v - c) ** 2 / (v * a) + (ramp + LOST * length / c) * (1.0 - c / v) > v / a + ramp
 
 
 @kernel

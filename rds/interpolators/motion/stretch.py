@@ -16,6 +16,8 @@ from math import ceil, sqrt
 
 import numpy as np
 
+from rds.core.compiling import kernel
+from rds.interpolators.motion.corners import motion, seam
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.pieces import CAP, END, FIRST, LAST, LENGTH, REST, SHARE, no_pieces
 from rds.interpolators.motion.profile import cut, hold_tops, phases_of, settled, speeds
@@ -60,6 +62,8 @@ class Stretch:
         self._next = 1  # sample of the stretch
         self._window = WINDOW
         self._rows = np.empty((0, 5))
+        self._phases = np.empty((0, 6))  # of the motion, in its own time
+        self._moved, self._lasts = 0.0, 0.0  # the profile's time up to which there are some, and the motion's
 
     def extend(self, f: np.ndarray, u: np.ndarray) -> None:
         """More pieces that follow. Between stretches and within."""
@@ -205,17 +209,22 @@ class Stretch:
         return bent
 
     def _samples(self, at: np.ndarray, count: int, finish: int | None) -> Iterator[tuple[Samples, int | None]]:
-        if finish is None:
-            stop = int(self._time / self._T * (1.0 - 1e-12))
-        else:
-            stop = ceil((self._time + self._tau) / self._T - 1e-9)
-        f, u = self._f[:count], self._u[:count]
+        f, u, limits = self._f[:count], self._u[:count], self._limits
+        ends = self._time + self._tau if finish is not None else seam(self._rows, self._tau, self._moved, self._time)
+        phases, self._lasts = motion(
+            *(self._rows, self._tau, self._moved, ends, self._lasts, f, u, at[: count + 1]),
+            *(limits.velocity, limits.acceleration, limits.jerk),
+        )
+        self._moved = ends
+        self._phases = np.concatenate((self._phases, phases))
+        lasts = self._lasts / self._T
+        stop = int(lasts * (1.0 - 1e-12)) if finish is None else ceil(lasts - 1e-9)
         while self._next <= stop:
             m = min(stop - self._next + 1, MOST_ROWS)
             position, velocity, acceleration = np.empty((m, 6)), np.empty((m, 6)), np.empty((m, 6))
             distance, piece = np.empty(m), np.empty(m, np.int64)
             out = (position, velocity, acceleration, distance, piece)
-            sample(self._rows, self._tau, self._T, self._next, m, f, u, at, *out)
+            sample(self._phases, self._T, self._next, m, f, u, at, *out)
             self._next += m
             ended = finish is not None and self._next > stop
             if ended:
@@ -226,25 +235,37 @@ class Stretch:
 
     def _forget(self, at: np.ndarray) -> None:
         """Drop what no further sample needs, and count place and time from later on, which keeps them precise."""
-        since = self._next * self._T - self._tau
-        old = int(np.searchsorted(self._rows[:, SINCE], since, side="right")) - 1
-        if old > 0:
-            self._rows = self._rows[old:]
-        whole = max(int(since / self._T) - 1, 0)
-        self._rows[:, SINCE] -= whole * self._T
-        self._time -= whole * self._T
-        self._next -= whole
-        needed = float(self._rows[0, PLACE]) - 2.0 * self._reach
+        since = self._moved - self._tau
+        old = max(int(np.searchsorted(self._rows[:, SINCE], since, side="right")) - 1, 0)
+        before = float(self._rows[old, SINCE])
+        self._rows = self._rows[old:]
+        self._rows[:, SINCE] -= before
+        self._time -= before
+        self._moved -= before
+        done = (self._next - 1) * self._T
+        self._phases = self._phases[self._phases[:, SINCE] + self._phases[:, LASTS] > done]
+        self._phases[:, SINCE] -= done
+        self._lasts -= done
+        self._next = 1
+        needed = float(self._rows[0, PLACE])
+        if len(self._phases):
+            needed = min(needed, float(self._phases[0, PLACE]))
+        needed -= 2.0 * self._reach
         gone = max(int(np.searchsorted(at, needed, side="right")) - 1, 0)
         self._passed = max(int(np.searchsorted(at, self._place, side="right")) - 1 - gone, 0)
         if gone > 0:
             self._f, self._u = self._f[gone:], self._u[gone:]
             self._known = max(self._known - gone, 0)
             self._rows[:, PLACE] -= at[gone]
+            self._phases[:, PLACE] -= at[gone]
             self._place -= at[gone]
 
 
-def _lasting(phases: np.ndarray) -> float:
+@kernel
+def _lasting(phases):
     """s."""
-    sums = phases[:, 1] + phases[:, 2]
-    return float((2.0 * phases[:, 0] / np.where(sums > 0.0, sums, np.inf)).sum())
+    total = 0.0
+    for i in range(len(phases)):
+        if phases[i, 1] + phases[i, 2] > 0.0:
+            total += 2.0 * phases[i, 0] / (phases[i, 1] + phases[i, 2])
+    return total

@@ -8,9 +8,10 @@ from rds.core.errors import InputError
 class ProgramError(InputError):
     """A part program says something that the dialect or the machine does not allow. Exit code 2.
 
-    `file` (as given; "" when the program has no name), `line` and `column` (from 1; column 0: the line as a whole),
-    `word` (as it is written in the program; "" when the fault is of no one word). The message says what, and after a
-    semicolon what to do; str() puts the place before it: `part.ngc:12:5: G81: ...`.
+    `file` (as given; "" when the program has no name), `line` and `column` (from 1; line 0: the file as a whole, as one
+    that cannot be read; column 0: the line as a whole), `word` (as it is written in the program; "" when the fault is
+    of no one word). The message says what, and after a semicolon what to do; str() puts the place before it:
+    `part.ngc:12:5: G81: ...`.
     """
 
     def __init__(self, message: str, *, file: str = "", line: int = 0, column: int = 0, word: str = ""):
@@ -19,7 +20,7 @@ class ProgramError(InputError):
         self.column = column
         self.word = printable(word)
         self.reason = printable(message)
-        place = f"{file or 'program'}:{line}:{column}" if column else f"{file or 'program'}:{line}"
+        place = ":".join(str(part) for part in (file or "program", line, column) if part)
         super().__init__(f"{self.word}: {self.reason}" if word else self.reason, where=printable(place))
 
     def at(self, file: str, line: int, column: int = 0, word: str = "") -> ProgramError:

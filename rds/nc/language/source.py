@@ -241,5 +241,5 @@ def open_file(path: str | Path, name: str, *, semicolons: bool = False) -> Sourc
     try:
         stream = open(path, "rb")  # noqa: SIM115 (closed by close)
     except OSError as error:
-        raise ProgramError(f"cannot be read ({error.strerror}); check the path", file=name, line=0) from None
+        raise ProgramError(f"cannot be read ({error.strerror}); check the path", file=name) from None
     return Source(stream, name, folder=os.path.dirname(path), semicolons=semicolons)
