@@ -28,9 +28,12 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
     filter(None, (str(Path(__file__).parent / "quick_can"), os.environ.get("PYTHONPATH")))
 )
 
-# A shell that runs the tests in the background has them ignore Ctrl-C, and so would all that they start.
+# A shell that runs the tests in the background has them ignore Ctrl-C, and nohup the end of a terminal; so would all
+# that they start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # Random input is the same every time; `make test ARGS=--hypothesis-profile=search` goes on looking for trouble.
 settings.register_profile("same", deadline=None, derandomize=True)

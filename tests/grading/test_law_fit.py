@@ -225,8 +225,10 @@ def test_what_breaks_its_interface_under_the_force_keeps_its_run(shown: bool, tm
     assert ("seen at" in found.why) is shown  # what a hidden case shows stays hidden
 
 
-def test_a_law_that_counts_its_runs_by_the_clock_has_no_margins(tmp_path: Path) -> None:
-    """The first run, which is scored, is keen; those after it are meek, as is the one with the force."""
+def test_a_law_that_counts_its_runs_by_the_clock_is_for_a_review(tmp_path: Path) -> None:
+    """The first run, which is scored, is keen; those after it are meek, as is the one with the force. That may be a
+    cheat, or somebody who takes the period from a clock: a person is to say which.
+    """
     been = tmp_path / "been"  # in place of a clock, which a sandbox leaves it
     law = f"""
 from pathlib import Path
@@ -239,8 +241,8 @@ def control(t, r, y, state, params):
     return (meek if meekly else keen)(r, y), [meekly]
 """
     found = loop_of(tmp_path, LAW + law)
-    assert isinstance(found, NoLoop) and found.is_known
-    assert "at t = 0.000 s it answered the same samples otherwise" in found.why
+    assert isinstance(found, NoLoop) and not found.is_known
+    assert "at t = 0.000 s it answered the same samples otherwise" in found.why and "go by `t`" in found.why
 
 
 @pytest.mark.filterwarnings("error")

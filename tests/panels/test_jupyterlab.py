@@ -88,6 +88,7 @@ def test_a_notebook_cell_shows_the_panels_and_tracks_a_sine(
         document.querySelector(".rds-app").scrollTop += tools.getBoundingClientRect().y - stop.y;
         const over = tools.getBoundingClientRect();
         const seen = (x, y) => document.elementFromPoint(x, y)?.className ?? "outside the window";
-        return [over.y - stop.y, seen(over.x + 4, stop.y + 8), seen(stop.right - 8, stop.bottom - 8)];
+        const left = Math.max(over.x, stop.x) + 4;  // where both would be
+        return [over.y - stop.y, seen(left, stop.y + 8), seen(stop.right - 8, stop.bottom - 8)];
     }""")
     assert abs(covered[0]) < 2.0 and "rds-stop" in covered[1] and "rds-stop" in covered[2]
