@@ -388,15 +388,16 @@ def test_the_tolerance_is_measured_to_the_path_at_a_sharp_turn() -> None:
     assert 0.9 * 0.05 < away <= 0.05
 
 
+@pytest.mark.parametrize("feed", [1.5, 30.0])
 @pytest.mark.parametrize("seed", range(4))
-def test_no_plan_is_slower_than_stopping_at_every_move(seed: int) -> None:
+def test_no_plan_is_slower_than_stopping_at_every_move(seed: int, feed: float) -> None:
     rng = np.random.default_rng(seed)
     turn = np.cumsum(rng.uniform(-2.5, 2.5, 20))
     steps = 10 ** rng.uniform(-1, 1) * rng.uniform(0.1, 1.0, 20)
     points = [tuple(p) for p in np.cumsum(np.column_stack((np.cos(turn), np.sin(turn))) * steps[:, None], axis=0)]
     limits = Limits(np.r_[[130.0] * 3, [0.0] * 3], np.r_[[400.0] * 3, [0.0] * 3], np.r_[[12000.0] * 3, [0.0] * 3])
     times = [
-        sum(map(len, plan([polygon(points, 30.0, mode=mode, tolerance=0.01)], limits, T)))
+        sum(map(len, plan([polygon(points, feed, mode=mode, tolerance=0.01)], limits, T)))
         for mode in (BLEND, EXACT_STOP)
     ]
     assert times[0] <= times[1] + 1

@@ -7,7 +7,7 @@ from math import ceil, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
@@ -215,6 +215,7 @@ STATES = st.tuples(st.floats(-40, 40), st.floats(-40, 40), st.floats(-300, 300),
 def test_a_move_that_ends_in_motion_hands_over_to_the_next(way: tuple[float, ...], there: tuple[float, ...]) -> None:
     """There and to rest again: one sequence of samples, within the limits where the two moves meet as elsewhere."""
     pytest.importorskip("ruckig")
+    assume(any(there))  # a move that ends at rest takes its least time, whatever the sample period is
     T, limits = 1e-3, ((50.0, 50.0), (400.0, 400.0), (12000.0, 12000.0))
     room = [min(40.0, 50.0 - a * a / 24000.0) for a in there[2:]]  # a velocity that the acceleration does not overrun
     speed, push = np.clip(there[:2], -np.array(room), room).tolist(), list(there[2:])

@@ -11,6 +11,8 @@ import numpy as np
 
 from rds.core.compiling import kernel
 
+ALL = 1.0 - 1e-6  # of a length: a ramp that takes so much of it takes all of it
+
 
 @kernel
 def speeds(edges, cap, push, first, last):
@@ -52,9 +54,9 @@ def phases_of(edges, cap, push, v):
             down = (top * top - v1 * v1) / (2.0 * a)
         if down < 1e-9 * length and v1 > 0.0:
             down, top = 0.0, v1
-            up = length if top < c and v0 < v1 else min(up, length)
-        if up == 0.0 and top < c and v1 < v0:
-            down = length
+            up = length if up > ALL * length and v0 < v1 else min(up, length)
+        if up == 0.0 and v1 < v0:  # what starts below the highest speed by rounding only has a steady part
+            down = length if down > ALL * length else down
         steady = max(length - up - down, 0.0)
         if up > 0.0:
             phases[count, 0], phases[count, 1], phases[count, 2] = up, v0, top
