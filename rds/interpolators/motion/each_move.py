@@ -102,7 +102,8 @@ def _along(segment: np.ndarray, within: Limits, tau: float) -> tuple[np.ndarray,
     slope, bend, twist = (f[first : first + 6] for first in (SLOPE, BEND, TWIST))
     moving = slope > 0.0
     left = within.jerk[moving] - cap**3 * twist[moving] - 3.0 * cap * push * bend[moving]
-    return f, u, cap, push, float((left / slope[moving]).min())
+    with np.errstate(over="ignore"):  # of an axis that hardly moves
+        return f, u, cap, push, float((left / slope[moving]).min())
 
 
 def _samples(f: np.ndarray, u: np.ndarray, along: Along) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
