@@ -337,8 +337,10 @@ function render({ model, el }) {
   const app = document.querySelector(".rds-app");
   if (app) themed.observe(app, { attributes: true, attributeFilter: ["class", "lang"] });
   let around = null;
-  requestAnimationFrame(() => { around = place(); around.addEventListener("rds-time", heard); build(); model.send({ kind: "all" }); });
-  return () => { clearInterval(timer); around?.removeEventListener("rds-time", heard); themed.disconnect(); sized.disconnect(); model.off("msg:custom", receive); model.off("change:traces", retraced); model.off("change:window", widened); model.off("change:events", marked); plots.forEach(({ plot }) => plot.destroy()); };
+  const begin = () => { if (around) return; around = place(); around.addEventListener("rds-time", heard); build(); model.send({ kind: "all" }); };
+  requestAnimationFrame(begin);
+  const late = setTimeout(begin, 250); // a page behind others has no frames
+  return () => { clearInterval(timer); clearTimeout(late); around?.removeEventListener("rds-time", heard); themed.disconnect(); sized.disconnect(); model.off("msg:custom", receive); model.off("change:traces", retraced); model.off("change:window", widened); model.off("change:events", marked); plots.forEach(({ plot }) => plot.destroy()); };
 }
 
 export default { render };
