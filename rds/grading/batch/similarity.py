@@ -142,14 +142,14 @@ def similar_pairs(
     known = {value for prints in template for value in prints}
     try:
         with closing(sqlite3.connect("")) as table:
-            return _Class(table, found, others, known).pairs(sources or {})
+            return _Programs(table, found, others, known).pairs(sources or {})
     except sqlite3.Error as error:
         said = f"programs cannot be compared: {error}; make room in the temporary folder, and go on with --resume"
         raise InputError(said) from error
 
 
-class _Class:
-    """Programs in a table of SQLite's: `prints` has all, `shared` who has what in common."""
+class _Programs:
+    """In a table of SQLite's: `prints` has the fingerprints of all, `shared` who has which in common."""
 
     def __init__(self, table: Connection, found: Iterable[Program], others: Iterable[Program], known: Set[int]):
         self._table = table
