@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.quantities import Quantity
+from rds.core.quantities import Quantity, near
 
 
 def check_known(given: Iterable[str], known: Iterable[str], owner: str) -> None:
@@ -16,9 +15,7 @@ def check_known(given: Iterable[str], known: Iterable[str], owner: str) -> None:
     for name in given:
         if name not in table:
             has = f"it has {', '.join(table)}" if table else "it has none"
-            close = get_close_matches(str(name), table, n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else ""
-            raise InputError(f"{owner} has no option {name!r}; {has}{hint}")
+            raise InputError(f"{owner} has no option {name!r}; {has}{near(name, table)}")
 
 
 def read_options(given: Mapping[str, Any], options: Mapping[str, Quantity], owner: str) -> dict[str, float]:

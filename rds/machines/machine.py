@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
-from rds.core.quantities import Flag, Items, Quantity, Table, Text
+from rds.core.quantities import Flag, Items, Quantity, Table, Text, near
 from rds.core.shared_quantities import NODE, SAMPLE_PERIOD
 from rds.core.toml_table import TomlTable
 from rds.machines.link_table import LINKS, TOOL, WORK, ChainEnd, Link, read_links
@@ -213,9 +213,9 @@ def load_machine(name: str) -> Machine:
     """
     path = Path(name) if name.endswith(".toml") else Path(str(files("rds.machines").joinpath(f"{name}.toml")))
     if not path.is_file():
-        raise InputError(
-            f"there is no machine {name!r}; known machines: {', '.join(machine_names())}, or the path of a .toml file"
-        )
+        names = machine_names()
+        known = f"known machines: {', '.join(names)}, or the path of a .toml file{near(name, names)}"
+        raise InputError(f"there is no machine {name!r}; {known}")
     return machine_from(TomlTable.open(path, MACHINE))
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
-from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
-from rds.core.quantities import Quantity, Text, checked
+from rds.core.quantities import Quantity, Text, checked, near
 
 ENDLESS = 1 << 62  # ns
 
@@ -85,9 +84,8 @@ class Fault:
     def __post_init__(self) -> None:
         kind = KINDS.get(self.kind)
         if kind is None:
-            close = get_close_matches(str(self.kind), KINDS, n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else ""
-            raise InputError(f"kind = {self.kind!r} is no kind of fault; kinds are {', '.join(KINDS)}{hint}")
+            kinds = f"{', '.join(KINDS)}{near(self.kind, list(KINDS))}"
+            raise InputError(f"kind = {self.kind!r} is no kind of fault; kinds are {kinds}")
         said = {_word(name) for name, value in asdict(self).items() if value is not None} - {"kind", "at"}
         for word in sorted(said - set(kind.words)):
             raise InputError(f"{self.kind!r} has nothing to do with {word!r}; it takes {', '.join(kind.words)}")
@@ -121,9 +119,7 @@ class Fault:
             raise InputError(f"a fault needs a kind: {', '.join(KINDS)}")
         for word in table:
             if word not in known:
-                close = get_close_matches(word, known, n=1)
-                hint = f"; did you mean {close[0]!r}?" if close else ""
-                raise InputError(f"a fault has no {word!r}; it has {', '.join(known)}{hint}")
+                raise InputError(f"a fault has no {word!r}; it has {', '.join(known)}{near(word, known)}")
         return cls(**{"duration" if word == "for" else word: value for word, value in table.items()})
 
     def to_table(self) -> dict[str, Any]:

@@ -16,13 +16,12 @@ import struct
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from difflib import get_close_matches
 from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
-from rds.core.quantities import Quantity
+from rds.core.quantities import Quantity, near
 from rds.modes.loop.shared_words import read_word, write_float, write_word
 from rds.modes.process.shared import make
 
@@ -205,9 +204,8 @@ class LiveValues:
 def find(channels: Mapping[str, Channel], name: str) -> Channel:
     """The channel called `name`; InputError lists the ones there are."""
     if name not in channels:
-        close = get_close_matches(str(name), list(channels), n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
-        raise InputError(f"there is no live value {name!r}; this run has {', '.join(channels)}{hint}")
+        has = f"{', '.join(channels)}{near(name, list(channels))}"
+        raise InputError(f"there is no live value {name!r}; this run has {has}")
     return channels[name]
 
 
