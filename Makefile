@@ -37,9 +37,13 @@ bench: $(DONE) ## measure speed and latency, beside other programs where they ar
 pictures: $(DONE) ## draw the documents' pictures afresh
 	$(BIN)/python tests/pictures.py
 
+# The newest page of Voilà and the newest extension for its widgets that were built with one JupyterLab. With later ones
+# the page is the same, and the browser's console has up to 13 warnings.
+SAME_LAB := 'voila<=0.5.8' 'jupyterlab-widgets<=3.0.13'
+
 lock: ## renew requirements.lock from pyproject.toml (needs uv)
 	@test -n "$(UV)" || { echo "make lock needs uv: https://docs.astral.sh/uv/" >&2; exit 2; }
-	printf 'hatchling>=1.25\neditables>=0.5\n' | "$(UV)" pip compile pyproject.toml - --all-extras --universal \
+	printf '%s\n' 'hatchling>=1.25' 'editables>=0.5' $(SAME_LAB) | "$(UV)" pip compile pyproject.toml - --all-extras --universal \
 		--python-version 3.11 --generate-hashes --upgrade --quiet --no-annotate \
 		--no-emit-index-url --no-emit-find-links \
 		--custom-compile-command "make lock" --output-file requirements.lock

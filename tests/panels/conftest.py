@@ -137,6 +137,8 @@ def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[
         page.set_default_timeout(PATIENCE)
         page.wait_for_selector = partial(see, page)
         page.on("request", asked)
+        page.warned = []  # what its console has of warnings and errors
+        page.on("console", lambda said: page.warned.append(said.text) if said.type in ("warning", "error") else None)
         pages.append(page)
         return page
 
