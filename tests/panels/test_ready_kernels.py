@@ -189,3 +189,16 @@ def test_kernels_end_with_the_server_though_compiled_code_holds_one(
         client.stop_channels()
         kernel.kill()
         idle.kill()
+
+
+def test_a_page_waits_for_minutes_for_what_its_kernel_shows() -> None:
+    """On a busy computer its hundreds of messages come late, and a page that does not wait for them stays empty."""
+    pytest.importorskip("voila", reason="Voilà is not installed: it is in the extra lab")
+    from nbformat.v4 import new_notebook
+    from voila.execute import VoilaExecutor
+
+    from rds.panels.app.server import PanelsServer
+
+    server = PanelsServer()
+    server.parse_command_line(serve._options(None, False, "private"))
+    assert VoilaExecutor(new_notebook(), config=server.config).iopub_timeout >= 60

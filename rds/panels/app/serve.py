@@ -21,6 +21,7 @@ from rds.panels.registry import PANELS
 
 _HERE = Path(__file__).parent
 LEFT = 60  # s after which a kernel ends that no browser shows and that has nothing to say: nothing goes on in it
+SHOWN = 120  # s that the server waits for what a kernel shows; Jupyter's own 4 left pages empty on a busy computer
 
 
 def serve(
@@ -89,6 +90,7 @@ def _options(port: int | None, browser: bool, private: str) -> list[str]:
         "VoilaConfiguration.preheat_kernel": True,  # the first page opens on a kernel that has loaded everything
         "VoilaConfiguration.default_pool_size": 1,
         "VoilaConfiguration.show_tracebacks": True,
+        "VoilaExecutor.iopub_timeout": SHOWN,
         "VoilaConfiguration.file_allowlist": "$.",  # a pattern that no file fits
         "VoilaConfiguration.multi_kernel_manager_class": "rds.panels.app.kernels.PageKernels",
         "MappingKernelManager.cull_idle_timeout": LEFT,

@@ -78,8 +78,9 @@ class StripChart(anywidget.AnyWidget):
         self.send({"kind": "ghost", "width": rows.shape[1]}, [rows.tobytes()])
 
     def _asked(self, _: Any, content: Any, __: Any) -> None:
-        """A page that has just been shown asks for everything so far."""
+        """A page just shown asks for everything so far; it may have missed what changed while it was loaded."""
         if content == {"kind": "all"}:
+            self.send_state(["traces", "events", "ghost"])
             self.send({"kind": "clear"})
             if len(self._stream.rows):
                 self._deliver(self._stream.rows)

@@ -72,6 +72,7 @@ class PathView(anywidget.AnyWidget):
 
     def _asked(self, _: Any, content: Any, __: Any) -> None:
         if content == {"kind": "all"}:
+            self.send_state(["low", "high", "ends", "tool", "sentence"])
             self._deliver()
 
 

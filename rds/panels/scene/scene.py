@@ -72,8 +72,9 @@ class MachineScene(anywidget.AnyWidget):
         self.send({"kind": "rows", "width": rows.shape[1]}, [np.ascontiguousarray(rows, dtype="<f8").tobytes()])
 
     def _asked(self, _: Any, content: Any, __: Any) -> None:
-        """A page that begins to look asks for everything so far."""
+        """A page that begins to look asks for everything; it may have missed what changed while it was loaded."""
         if content == {"kind": "all"}:
+            self.send_state(["live", "columns", "stock", "tools"])
             self.send({"kind": "clear"})
             if len(self._stream.rows):
                 self._deliver(self._stream.rows)
