@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from rds.core.errors import InputError, RdsError
 from rds.interpolators.motion import Limits, plan, predicted_time
 from rds.interpolators.motion.certificate import Certificate, certified
+from rds.interpolators.motion.least_time import LeastTime
 from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT, arc, chain, line, point_at
 
 from .chains import MACHINES, Event, PathBlock, chains, planned, polygon
@@ -401,6 +402,31 @@ def test_no_plan_is_slower_than_stopping_at_every_move(seed: int, feed: float) -
         for mode in (BLEND, EXACT_STOP)
     ]
     assert times[0] <= times[1] + 1
+
+
+@settings(max_examples=60)
+@given(
+    data=st.data(),
+    axes=st.lists(st.floats(0.0, 2.0), min_size=9, max_size=9),
+    feed=st.floats(2.0, 20.0),
+    tolerance=st.floats(-3.0, -1.7),
+)
+def test_nor_where_the_axes_differ_a_hundredfold(
+    data: st.DataObject, axes: list[float], feed: float, tolerance: float
+) -> None:
+    """And what it is compared with, the least time along its path, is that of the motion that was taken."""
+    steps = data.draw(st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 3), min_size=2, max_size=12))
+    size = data.draw(st.sampled_from([0.05, 1.0, 10.0]))
+    points = [tuple(p) for p in np.cumsum([(0.0, 0.0, 0.0), *steps], axis=0) * size]
+    rows = 10.0 ** np.add(np.reshape(axes, (3, 3)), [[0.0], [1.0], [3.0]])
+    limits = Limits(*(np.r_[row, [0.0] * 3] for row in rows))
+    times = []
+    for mode in (BLEND, EXACT_STOP):
+        least = LeastTime(limits, T)
+        path = polygon(points, feed, mode=mode, tolerance=10.0**tolerance)
+        times.append(predicted_time(plan([path], limits, T, least_time=least)))
+        assert least.seconds <= times[-1]
+    assert times[0] <= times[1] + 0.5 * T
 
 
 @pytest.mark.parametrize("way", [0.02, 0.1, 0.5, 3.0, 30.0])

@@ -12,7 +12,7 @@ from rds.core.errors import InputError
 from rds.interpolators.motion.checking import check_segments
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.samples import Rows, SampleBlock
-from rds.interpolators.motion.segments import SEGMENT
+from rds.interpolators.motion.segments import EXACT_STOP, LINE, SEGMENT
 
 if TYPE_CHECKING:
     from rds.interpolators.motion.least_time import LeastTime
@@ -23,6 +23,7 @@ MARGIN = 1e-3  # relative, kept off the limits for rounding
 PASSING = ("coolant", "output")  # kinds of events for which the motion does not come to rest
 NOT_BUILT = ("line", "rapid", "tip", "tool_length")  # columns of the segments that the pieces do not need
 ENOUGH = 2048  # segments, or samples, that are gathered before they are handed on
+MOST_HELD = 200_000  # samples of a short program, until it is known whether stopping after each move would be faster
 
 
 def plan(
@@ -45,19 +46,73 @@ def plan(
     Each finite difference of the samples keeps to the velocity, acceleration and jerk of each axis; the speed along the
     path to the programmed rate. On exact paths all samples are on the path, and the motion slows down where direction
     or curvature jump, down to a stop. In mode BLEND corners are cut within the tolerance; where the path turns back by
-    more than 150° it is stopped at. The last sample is at rest on the end.
+    more than 150° it is stopped at. The last sample is at rest on the end. The motion of less than ENOUGH segments and
+    MOST_HELD samples takes no longer than one that rests after each move: where it would, it is that one.
 
     Raises InputError, by line, for a segment that cannot be: a rate of 0, an axis without limits, a gap before it.
     """
     if not T > 0.0:
         raise InputError(f"sample period T = {T!r} must be more than 0 s")
-    planner = _Planner(limits, T, tolerance, start, least_time)
+    shown = _Shown(least_time)
+    planner = _Planner(limits, T, tolerance, start, shown)
     for block in blocks:
         planner.take(getattr(block, "segments", block), getattr(block, "events", ()))
         yield from planner.run(final=False)
-    yield from planner.run(final=True)
+        shown.hand_on()
+    if planner.least_stopping() <= MOST_HELD * T:
+        stopping = _Shown(least_time)
+        found, shown = _shorter(planner, shown, _Planner(limits, T, tolerance, start, stopping), stopping)
+        yield from found
+    else:
+        yield from planner.run(final=True)
+    shown.hand_on()
     if least_time is not None:
         least_time.finish()
+
+
+def _shorter(
+    planner: _Planner, shown: _Shown, stopping: _Planner, shown_stopping: _Shown
+) -> tuple[list[SampleBlock], _Shown]:
+    """The motion of a short program, or where that takes less time the one that rests after each of its moves.
+
+    Where to stop is decided corner by corner (path.py), by an estimate that does not know what is near the corner.
+    """
+    least = planner.least_stopping()
+    segments, events = np.concatenate([np.empty(0, SEGMENT), *planner.waiting]), list(planner.events)
+    found = list(planner.run(final=True))
+    if predicted_time(found) <= least:
+        return found, shown
+    segments["mode"] = EXACT_STOP
+    stopping.take(segments, ())
+    stopping.events = events
+    stops = list(stopping.run(final=True))
+    return (stops, shown_stopping) if predicted_time(stops) < predicted_time(found) else (found, shown)
+
+
+class _Shown:
+    """What a planner shows of its path, until it is known whether the motion takes it."""
+
+    def __init__(self, to: LeastTime | None) -> None:
+        self._to = to
+        self._parts: list[tuple[np.ndarray, np.ndarray] | float] = []
+
+    def extend(self, f: np.ndarray, u: np.ndarray) -> None:
+        if self._to is not None:
+            self._parts.append((f.copy(), u.copy()))
+
+    def rest(self, seconds: float) -> None:
+        self._parts.append(seconds)
+
+    def hand_on(self) -> None:
+        """It takes it."""
+        parts, self._parts = self._parts, []
+        if self._to is None:
+            return
+        for part in parts:
+            if isinstance(part, tuple):
+                self._to.extend(*part)
+            else:
+                self._to.rest(part)
 
 
 def predicted_time(blocks: Iterable[SampleBlock]) -> float:
@@ -69,7 +124,7 @@ def predicted_time(blocks: Iterable[SampleBlock]) -> float:
 
 
 class _Planner:
-    def __init__(self, limits: Limits, T: float, tolerance: float, start: np.ndarray | None, least: LeastTime | None):
+    def __init__(self, limits: Limits, T: float, tolerance: float, start: np.ndarray | None, shown: _Shown):
         from rds.interpolators.motion.stretch import Stretch  # numba, where it is installed
 
         self.limits, self.T, self.tolerance = limits, T, tolerance
@@ -83,7 +138,7 @@ class _Planner:
                 "raise the jerk of [axis.NAME.limits], or lower the acceleration"
             )
         self.stretch = Stretch(self.within, self.tau, T)
-        self.least_time = least
+        self.shown = shown
         self.state = np.array([0.0, 0.0, float(limits.velocity.max())])
         self.point = None if start is None else np.array(start, dtype=float)
         self.new = np.empty(0, SEGMENT)  # not yet handed to `build`, or not done with
@@ -108,6 +163,35 @@ class _Planner:
         self.end = segments["end"][-1].copy()
         self.waiting.append(segments)
         self.taken += len(segments)
+
+    def least_stopping(self) -> float:
+        """s, at the least, of a motion that rests after each move; inf if it has begun, or rests there anyway."""
+        modes = np.concatenate([np.empty(0, np.int8), *(each["mode"] for each in self.waiting)])
+        if len(self.kept) or (modes[:-1] == EXACT_STOP).all():
+            return inf
+        dwelling = sum(float(event.value) for _, event in self.events if event.kind == "dwell")
+        return dwelling + sum(map(self._least, self.waiting))
+
+    def _least(self, segments: np.ndarray) -> float:
+        """The closed form of lines, in the least time within the limits; arcs at their rate."""
+        way, rate = segments["length"], np.where(segments["rapid"], inf, segments["rate"])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            each = np.abs(segments["end"] - segments["start"]) / way[:, None]
+            speed, push, jerk = (
+                np.where(each > 0.0, limit / each, inf).min(axis=1)
+                for limit in (self.within.velocity, self.within.acceleration, self.within.jerk)
+            )
+            speed = np.minimum(speed, rate)
+            rise = push / jerk  # s, in which the acceleration is reached
+            top = np.where(
+                way >= 2.0 * push * rise**2,
+                0.5 * push * (np.sqrt(rise**2 + 4.0 * way / push) - rise),
+                np.cbrt(0.25 * way**2 * jerk),
+            )
+            top = np.minimum(top, speed)
+            ramp = np.where(top >= push * rise, top / push + rise, 2.0 * np.sqrt(top / jerk))
+            seconds = np.where(segments["plane"] == LINE, way / top + ramp, way / rate)
+        return float(seconds[way > 0.0].sum())
 
     def run(self, final: bool) -> Iterator[SampleBlock]:
         if not final and sum(map(len, self.waiting)) < ENOUGH:
@@ -169,8 +253,7 @@ class _Planner:
         )
         u[:, 1:3] += first
         self.stretch.extend(f, u)
-        if self.least_time is not None:
-            self.least_time.extend(f, u)
+        self.shown.extend(f, u)
         self.new = new[done:]
 
     def _add(self, position, velocity, acceleration, distance, first, last) -> None:
@@ -195,8 +278,7 @@ class _Planner:
             _, event = self.events.pop(0)
             self.out.events.append((self.out.total - 1, event))
             rows = ceil(event.value / self.T - 1e-9) if event.kind == "dwell" else 0
-            if self.least_time is not None:
-                self.least_time.rest(rows * self.T)
+            self.shown.rest(rows * self.T)
             while rows > 0:
                 part = min(rows, 16384)
                 self._stay(part, position)
