@@ -19,28 +19,34 @@ except ImportError:  # the extra is not installed
 else:
     COMPILED = True
 
+_CHANGED: dict[Path, float] = {}  # folders of kernels, and when a file there was last changed
+
 
 def kernel(function: F) -> F:
     """The function compiled, or itself. No reordering of sums: compiled and plain give the same samples."""
-    compiled: Any = njit(cache=True)(function) if COMPILED else function
-    return cast(F, compiled)
+    return _compiled(function) if COMPILED else function
 
 
 def long_kernel(function: F) -> F:
     """The same of a kernel that goes on for long: other threads of the program go on meanwhile."""
-    compiled: Any = njit(cache=True, nogil=True)(function) if COMPILED else function
+    return _compiled(function, nogil=True) if COMPILED else function
+
+
+def _compiled(function: F, **options: Any) -> F:
+    compiled: Any = njit(cache=True, **options)(function)
+    folder = Path(function.__code__.co_filename).parent
+    if folder not in _CHANGED:
+        with suppress(OSError):
+            _CHANGED[folder] = max((file.stat().st_mtime for file in folder.glob("*.py")), default=0.0)
+            _forget_old(Path(compiled.stats.cache_path))
     return cast(F, compiled)
 
 
-def _forget_old() -> None:
-    """Drop what was compiled before a file here changed: numba looks at a kernel's own file, not at those it calls."""
-    folder = Path(__file__).parent
-    with suppress(OSError):
-        newest = max(file.stat().st_mtime for file in folder.glob("*.py"))
-        for index in folder.glob("__pycache__/*.nbi"):
-            if index.stat().st_mtime < newest:
-                index.unlink()
-
-
-if COMPILED:
-    _forget_old()
+def _forget_old(kept: Path) -> None:
+    """Drop what a folder has of kernels compiled before a file changed: of its own folder, or of one whose kernels have
+    been met, which it may call. Numba looks at a kernel's own file, not at those of the kernels that it calls.
+    """
+    newest = max(_CHANGED.values())
+    for index in kept.glob("*.nbi"):
+        if index.stat().st_mtime < newest:
+            index.unlink()
