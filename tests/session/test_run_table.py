@@ -108,3 +108,12 @@ def test_an_earlier_run_stands_behind_with_what_it_has(runs: tuple[Path, list[Ke
     assert strip.ghost == "before" and sent[-1][0] == {"kind": "ghost", "width": 5}
     strip.stand_behind(np.empty((0, 1)), "")
     assert strip.ghost == ""
+
+
+def test_a_page_that_was_being_loaded_is_told_what_changed_meanwhile() -> None:
+    """Jupyter loses what changes between the page's question for all widgets and the moment when it has made them."""
+    strip, told = StripChart(), []
+    strip.begin([("X_measured", "mm"), ("X_voltage", "V")])
+    strip.send_state = lambda key=None: told.extend(key)
+    strip._handle_custom_msg({"kind": "all"}, [])
+    assert {"traces", "events", "ghost"} <= set(told)
