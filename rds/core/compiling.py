@@ -48,5 +48,6 @@ def _forget_old(kept: Path) -> None:
     """
     newest = max(_CHANGED.values())
     for index in kept.glob("*.nbi"):
-        if index.stat().st_mtime < newest:
-            index.unlink()
+        with suppress(FileNotFoundError):  # another process was first
+            if index.stat().st_mtime < newest:
+                index.unlink()
