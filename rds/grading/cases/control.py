@@ -18,7 +18,7 @@ from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
 from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts
 from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_model, noise_of, read_disturbance
 from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
-from rds.grading.criteria.linear import SWITCHES, LinearLoop, NoLoop, linear_loop, switches, switches_often
+from rds.grading.criteria.linear import SWITCHES, LinearLoop, NoLoop, linear_loop, switches, switches_again
 from rds.grading.criteria.pushed import begin_of, force, free_stretch
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
@@ -187,7 +187,7 @@ class ControlCase:
                     "clock, keep memory in `state`, and give generators of random numbers a seed"
                 )
                 return (NoLoop(why, switches(u, limit)),)
-            if any(switches_often(each, limit) for each in (u[: stretch[0]], u[stretch[1] :])):
+            if any(switches_again(each, limit) for each in (u[: stretch[0]], u[stretch[1] :])):
                 found.append(NoLoop(SWITCHES, True))  # a relay there, whatever it is where it is measured
                 continue
             part = slice(begin, stretch[1])

@@ -35,7 +35,7 @@ _SIMPLER = 1.1  # a law of higher order must depart less than by this factor
 _SURELY = 0.05  # of the answer: a law that departs by more may be given poles that it does not have
 _AT_LIMIT, _OFTEN = 0.9, 0.2  # of the converter's limit; of the samples: where a loop that is not stable ends
 _CHATTERS = 0.25  # of the limit: RMS change of a voltage from sample to sample that switches rather than controls
-_JUMPS, _FEW_JUMPS = 0.05, 6  # of the samples, and at least: a law that starts, or meets its limit, has fewer
+_FEW_JUMPS = 6  # in a part that switches: a law that starts, or meets its limit, has fewer
 _GONE, _LEFT = 1e-6, 1e-3  # of the largest deviation: enough, and most, that may be left of it at the end
 _SHORT, _LONG = 1 << 10, 1 << 14  # samples of an answer
 SWITCHES = "its voltage switches from sample to sample by a good part of the converter's range"
@@ -107,10 +107,11 @@ def switches(command: np.ndarray, limit: float) -> bool:
     return not np.isfinite(changes).all() or bool(np.sqrt(np.mean(changes**2)) >= _CHATTERS * limit)
 
 
-def switches_often(command: np.ndarray, limit: float) -> bool:
-    """Whether a voltage, cut at `limit` (V), jumps again and again as a relay's, and not only when it meets a limit."""
-    jumps = np.abs(np.diff(np.clip(command, -limit, limit))) >= _CHATTERS * limit
-    return bool(jumps.sum() >= max(_FEW_JUMPS, _JUMPS * len(jumps)))
+def switches_again(command: np.ndarray, limit: float) -> bool:
+    """Whether a part of a voltage (V) switches as a relay, again and again, once it is cut at `limit` (V)."""
+    changes = np.diff(np.clip(command, -limit, limit))
+    jumps = np.count_nonzero(np.abs(changes) >= _CHATTERS * limit)
+    return bool(jumps >= _FEW_JUMPS and np.sqrt(np.mean(changes**2)) >= _CHATTERS * limit)
 
 
 def _runs_away(command: np.ndarray, limit: float) -> bool:
@@ -137,7 +138,7 @@ def linear_loop(
         whole = about.best(slice(None), _PARTS)
         if whole is not None:
             return whole
-        if any(switches_often(part, limit) for part in np.array_split(command, _PARTS)):
+        if any(switches_again(part, limit) for part in np.array_split(command, _PARTS)):
             return NoLoop(SWITCHES, True)
         edges = np.linspace(0, len(voltage), _QUARTERS + 1).astype(int)
         quarters = [slice(int(a), int(b)) for a, b in pairwise(edges)]
