@@ -336,10 +336,11 @@ def test_no_honest_law_is_called_unstable_by_a_law_that_is_only_near_it(name: st
         "return round(1500.0 * e + r.velocity / 1.764, 3), state",
         "return (max(-10.0, min(10.0, 1e4 * e)) if 0.2 < t < 0.9 else 30.0 * e + r.velocity / 1.764), state",
         "return (10.0 if e > 0.0 else -10.0) if 0.6 < t < 0.7 else 30.0 * e + r.velocity / 1.764, state",
+        "return 30.0 * e + r.velocity / 1.764 + (2.0 if round(t * 1000.0) % 2 else -2.0), state",
     ],
-    ids=["unstable and rounded", "a relay for half of the run", "a relay for a moment"],
+    ids=["unstable and rounded", "a relay for half of the run", "a relay for a moment", "a dither of 2 V"],
 )
-def test_what_swings_to_its_limits_has_no_loop(law: str, tmp_path: Path) -> None:
+def test_what_swings_or_switches_has_no_loop(law: str, tmp_path: Path) -> None:
     for seed in (1, 2, 3):
         text = f"def control(t, r, y, state, params):\n    e = r.position - y\n    {law}\n"
         found = loop_of(tmp_path, text, seed, moving=True)

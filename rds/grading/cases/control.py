@@ -187,8 +187,10 @@ class ControlCase:
                     "clock, keep memory in `state`, and give generators of random numbers a seed"
                 )
                 return (NoLoop(why, switches(u, limit)),)
-            if any(switches_again(each, limit) for each in (u[: stretch[0]], u[stretch[1] :])):
-                found.append(NoLoop(SWITCHES, True))  # a relay there, whatever it is where it is measured
+            # a relay where it is not measured, whatever it is elsewhere; or a law that shakes where nothing shakes it
+            parts = [u[: stretch[0]], u[stretch[1] :], *([] if self.noise else [u])]
+            if any(switches_again(each, limit) for each in parts):
+                found.append(NoLoop(SWITCHES, True))
                 continue
             part = slice(begin, stretch[1])
             with np.errstate(over="ignore"):  # of voltages that no converter has
