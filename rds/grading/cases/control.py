@@ -174,7 +174,7 @@ class ControlCase:
         again = run_loop(with_parts(plan, laws, self._disturbed(models, seed, number, forces=forces)), {})
         if again.fault:
             return (NoLoop(f"under a force on the axis, {again.fault}", True),)
-        found = []
+        found: list[LinearLoop | NoLoop] = []
         for name, model, stretch in zip(plan.names, models, stretches, strict=True):
             begin, ideal = begin_of(stretch, plan.samples), linear_model(model)
             assert ideal is not None  # by `can_be_linearized`, which the assignment has checked

@@ -199,8 +199,10 @@ class _Answer:
         if stable:
             least = min(share for share, _ in stable)
             return next(loop for share, loop in stable if share <= _SIMPLER * least)
-        share, loop = min(found, key=itemgetter(0), default=(np.inf, None))
-        return loop if share <= _SURELY or _runs_away(self.command[part], self.limit) else None
+        if not found:
+            return None
+        share, unstable = min(found, key=itemgetter(0))
+        return unstable if share <= _SURELY or _runs_away(self.command[part], self.limit) else None
 
 
 def closed(fit: LawFit, model: Model, T: float) -> LinearLoop | NoLoop:

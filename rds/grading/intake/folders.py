@@ -65,7 +65,7 @@ def read_regular(path: str | Path, most: int) -> bytes:
     return data
 
 
-def _fault(what: str, said: str, is_unreadable: bool) -> Refusal:
+def _fault(what: str, said: str | None, is_unreadable: bool) -> Refusal:
     return refusal(f"{what}: {said}; {_REMEDY}" if is_unreadable else f"{what}: {said}", is_unreadable)
 
 
