@@ -251,6 +251,34 @@ def test_our_own_errors_are_tried_again_then_listed_and_never_a_zero(
     assert again.graded_now == 1 and again.grades["ada"].status is Status.OK and not again.grader_errors
 
 
+def test_what_the_grader_may_not_read_is_no_zero_and_is_graded_once_it_may(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put(tmp_path / "in", {"ada.py": law(), "bob.py": law(), "cy/controller.py": law()})
+    opened, listed = os.open, os.scandir
+
+    def no_bob(path: Any, *rest: Any, **more: Any) -> int:
+        if str(path).endswith("in/bob.py"):
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return opened(path, *rest, **more)
+
+    def no_cy(path: Any) -> Any:
+        if str(path).endswith("in/cy"):
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return listed(path)
+
+    with monkeypatch.context() as closed:
+        closed.setattr(os, "open", no_bob)
+        closed.setattr(os, "scandir", no_cy)
+        found = run_batch(place / "task", tmp_path / "in", tmp_path / "out", jobs=1)
+    assert found.grades["ada"].status is Status.OK
+    for student in ("bob", "cy"):
+        grade = found.grades[student]
+        assert grade.status is Status.GRADER_ERROR and "must be able to read it" in grade.reason
+    again = run_batch(place / "task", tmp_path / "in", tmp_path / "out", jobs=1, resume=True)
+    assert [grade.status for grade in again.grades.values()] == [Status.OK] * 3 and again.graded_now == 2
+
+
 def test_a_worker_that_dies_is_replaced(place: Path, tmp_path: Path) -> None:
     handed_in = put(tmp_path / "in", {f"s{n}.py": law(10.0 + n) for n in range(6)})
     killed: list[int] = []

@@ -294,6 +294,59 @@ def test_a_relay_has_no_loop_and_friction_by_the_sign_of_the_error_is_for_a_revi
     assert isinstance(found, LinearLoop) or not found.is_known
 
 
+# each was told now and then that its loop is not stable, by a nearest linear law that has a pole which it does not have
+UNLIKE_ANY = {
+    "friction by the sign of the error, with a dead band": """
+def control(t, r, y, state, params):
+    e = r.position - y
+    u = 30.0 * e + (r.velocity + 0.00994 * r.acceleration) / 1.764
+    return u + 0.3 * (e > 0.002) - 0.15 * (e < -0.002), state
+""",
+    "an integrator that is cleared where the error changes its sign": """
+initial_state = (0.0, 0.0)
+def control(t, r, y, state, params):
+    q, last = state
+    e = r.position - y
+    q = 0.0 if e * last < 0.0 else max(-1.0, min(1.0, q + 0.12 * e))
+    return max(-10.0, min(10.0, 27.0 * e + q + r.velocity / 1.764)), (q, e)
+""",
+    "a gain of the feedforward that adapts itself": """
+initial_state = (1.764, None, 0.0)
+def control(t, r, y, state, params):
+    k, last, slow = state
+    v = 0.0 if last is None else (y - last) / 0.001
+    k = min(max(k + 0.002 * (v / slow - k), 1.4), 2.1) if abs(slow) > 1.0 else k
+    u = max(-10.0, min(10.0, 30.0 * (r.position - y) + (r.velocity + 0.00994 * r.acceleration) / k))
+    return u, (k, y, 0.98 * slow + 0.02 * u)
+""",
+}
+
+
+@pytest.mark.parametrize("plant", ["", 'plant = "machine"'])
+@pytest.mark.parametrize("name", UNLIKE_ANY)
+def test_no_honest_law_is_called_unstable_by_a_law_that_is_only_near_it(name: str, plant: str, tmp_path: Path) -> None:
+    for seed in range(1, 9):
+        found = loop_of(tmp_path, UNLIKE_ANY[name], seed, plant, moving=True)
+        assert found.margins[1] > 45.0 if isinstance(found, LinearLoop) else not found.is_known, (seed, found)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        "return round(1500.0 * e + r.velocity / 1.764, 3), state",
+        "return (max(-10.0, min(10.0, 1e4 * e)) if 0.2 < t < 0.9 else 30.0 * e + r.velocity / 1.764), state",
+        "return (10.0 if e > 0.0 else -10.0) if 0.6 < t < 0.7 else 30.0 * e + r.velocity / 1.764, state",
+        "return 30.0 * e + r.velocity / 1.764 + (2.0 if round(t * 1000.0) % 2 else -2.0), state",
+    ],
+    ids=["unstable and rounded", "a relay for half of the run", "a relay for a moment", "a dither of 2 V"],
+)
+def test_what_swings_or_switches_has_no_loop(law: str, tmp_path: Path) -> None:
+    for seed in (1, 2, 3):
+        text = f"def control(t, r, y, state, params):\n    e = r.position - y\n    {law}\n"
+        found = loop_of(tmp_path, text, seed, moving=True)
+        assert isinstance(found, NoLoop) and found.is_known, (seed, found)
+
+
 @pytest.mark.parametrize("step", [0.01, 0.02, 0.05])
 def test_coarse_rounding_is_measured_or_is_for_a_review(step: float, tmp_path: Path) -> None:
     law = SOLUTION + WRAPPED.format(before=f"y = round(y / {step}) * {step}", after="pass")

@@ -245,3 +245,24 @@ def test_unseeded_random_numbers_are_the_same_each_time(pool: Pool, written: Cal
         with pool.open(written(text, ""), kind="functions") as subject:
             drawn.append(subject.call("draw"))
     assert drawn[0] == drawn[1] and drawn[0][-1] != drawn[0][-2]
+
+
+def test_half_a_character_in_what_it_says_is_told_as_such_and_is_no_tampering(
+    pool: Pool, written: Callable[..., Path]
+) -> None:
+    raises = written('def control(t, r, y, state, params):\n    raise ValueError("no file " + chr(0xDCFF))\n', "")
+    with pool.open(raises) as subject:
+        subject.begin_control()
+        with pytest.raises(SubmissionError, match=r"ValueError: no file \?"):
+            subject.control(0.0, Reference(0.0, 0.0, 0.0), 0.0)
+    answers = written('def name():\n    return ["x" + chr(0xDCFF)]\n', "", "functions.py")
+    with pool.open(answers, kind="functions") as subject, pytest.raises(SubmissionError, match="half a character"):
+        subject.call("name")
+
+
+def test_a_file_that_imports_matplotlib_finds_it_imported(pool: Pool, written: Callable[..., Path]) -> None:
+    """Or each case, and above all the run that is counted, would import it anew: 18 s of a grader's time."""
+    pytest.importorskip("matplotlib")
+    text = 'import sys\nparams = {"ready": "matplotlib.pyplot" in sys.modules}\n'
+    with pool.open(written(text + "import matplotlib.pyplot as plt\n")) as subject:
+        assert subject.loaded.params == {"ready": True}

@@ -259,14 +259,21 @@ def test_whose_files_are_too_many_is_told(tmp_path: Path, monkeypatch: pytest.Mo
         collect(tmp_path, ACCEPTED)
 
 
+def test_a_file_beside_a_folder_of_the_same_name_is_told(tmp_path: Path) -> None:
+    put(tmp_path, {"kim.py": "x", f"kim/{ACCEPTED[0]}": "y", "lee.py": "z"})
+    found = of(tmp_path)
+    assert found["kim"].read() == b"y" and "kim.py lies beside a folder of the same name" in found["kim"].notes[0]
+    assert found["lee"].notes == ()
+
+
 def test_names_that_would_fool_somebody(tmp_path: Path) -> None:
-    names = ["a\nb", "a\\nb", "\u202eabc", "..", "Ada", "ada", "\x1b[31m", "con", "x" * 120]
+    names = ["a\nb", "a\\nb", "\u202eabc", "..", "Ada", "ada", "\x1b[31m", "con", "x" * 120, "  ", "\u3164", "\u2800"]
     folder = put(tmp_path, {f"{name}.py" if name != ".." else "...py": "" for name in names})
     raw = os.fsencode(folder) + b"/\xff\xfe.py"
     Path(os.fsdecode(raw)).write_text("")
     students = [row.student for row in collect(folder, ACCEPTED).rows]
     assert len(set(students)) == len(students) == len(names) + 1
-    assert all(name.isprintable() for name in students)
+    assert all(name.isprintable() and name.strip("\u3164\u2800 ") for name in students)
     safe = [safe_id(name).lower() for name in students]
     assert len(set(safe)) == len(safe)
 

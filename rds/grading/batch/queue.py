@@ -19,6 +19,7 @@ from rds.grading.intake.items import Refusal
 from rds.grading.intake.names import safe_id
 from rds.grading.intake.notebooks import Converted, converted
 from rds.grading.intake.single import wanted
+from rds.grading.intake.submissions import status_of
 
 _PATIENCE = 30.0  # s for a notebook
 
@@ -58,7 +59,7 @@ def queued(assignment: Assignment, intake: Intake, students: Path, jobs: int | N
         try:
             data = each.row.read()
         except Refusal as error:
-            each.grade = ungraded(assignment, each, Status.REFUSED, str(error))
+            each.grade = ungraded(assignment, each, status_of(error), str(error))
             continue
         each.code = spool.put(data)
         if each.row.is_notebook:

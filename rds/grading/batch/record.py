@@ -13,6 +13,7 @@ from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.core.installed import version as own_version
 from rds.grading.assignment.assignment import Assignment
+from rds.grading.grade import Status
 
 FILE = "batch.json"
 _FORMAT = 1
@@ -70,7 +71,7 @@ def read_record(folder: Path) -> Record:
 
 
 def check_same(before: Record, now: Record, place: Path) -> None:
-    """InputError that says what has changed so that scores could; new students are no change."""
+    """InputError that says what has changed so that scores could; new students and unreadable files do not count."""
     changes = []
     if before.assignment != now.assignment:
         changes.append("the assignment (assignment.toml, or a file that its cases read)")
@@ -81,7 +82,8 @@ def check_same(before: Record, now: Record, place: Path) -> None:
     gone = [student for student in before.handed_in if student not in now.handed_in]
     changes += _named("submissions gone", gone)
     kept = [student for student in before.handed_in if student in now.handed_in]
-    changes += _named("submissions", [s for s in kept if before.handed_in[s] != now.handed_in[s]])
+    readable = [s for s in kept if not before.handed_in[s].startswith(f"{Status.GRADER_ERROR}:")]
+    changes += _named("submissions", [s for s in readable if before.handed_in[s] != now.handed_in[s]])
     changes += _named("times of submission", [s for s in kept if before.times.get(s) != now.times.get(s)])
     if changes:
         raise InputError(

@@ -18,7 +18,7 @@ from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
 from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts
 from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_model, noise_of, read_disturbance
 from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
-from rds.grading.criteria.linear import LinearLoop, NoLoop, linear_loop, switches
+from rds.grading.criteria.linear import SWITCHES, LinearLoop, NoLoop, linear_loop, switches, switches_again
 from rds.grading.criteria.pushed import begin_of, force, free_stretch
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
@@ -174,7 +174,7 @@ class ControlCase:
         again = run_loop(with_parts(plan, laws, self._disturbed(models, seed, number, forces=forces)), {})
         if again.fault:
             return (NoLoop(f"under a force on the axis, {again.fault}", True),)
-        found = []
+        found: list[LinearLoop | NoLoop] = []
         for name, model, stretch in zip(plan.names, models, stretches, strict=True):
             begin, ideal = begin_of(stretch, plan.samples), linear_model(model)
             assert ideal is not None  # by `can_be_linearized`, which the assignment has checked
@@ -187,6 +187,11 @@ class ControlCase:
                     "clock, keep memory in `state`, and give generators of random numbers a seed"
                 )
                 return (NoLoop(why, switches(u, limit)),)
+            # a relay where it is not measured, whatever it is elsewhere; or a law that shakes where nothing shakes it
+            parts = [u[: stretch[0]], u[stretch[1] :], *([] if self.noise else [u])]
+            if any(switches_again(each, limit) for each in parts):
+                found.append(NoLoop(SWITCHES, True))
+                continue
             part = slice(begin, stretch[1])
             with np.errstate(over="ignore"):  # of voltages that no converter has
                 voltage = again.result[f"{name}_command"][part] - u[part]

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 
@@ -31,9 +32,13 @@ _QUARTERS = 4  # of the stretch, in which a law that is not one is fitted by its
 _SHORTEST = 40  # samples: a part that is halved again
 _VALUES = 6  # different ones, at least, in such a part
 _SIMPLER = 1.1  # a law of higher order must depart less than by this factor
+_SURELY = 0.05  # of the answer: a law that departs by more may be given poles that it does not have
+_AT_LIMIT, _OFTEN = 0.9, 0.2  # of the converter's limit; of the samples: where a loop that is not stable ends
 _CHATTERS = 0.25  # of the limit: RMS change of a voltage from sample to sample that switches rather than controls
+_FEW_JUMPS = 6  # in a part that switches: a law that starts, or meets its limit, has fewer
 _GONE, _LEFT = 1e-6, 1e-3  # of the largest deviation: enough, and most, that may be left of it at the end
 _SHORT, _LONG = 1 << 10, 1 << 14  # samples of an answer
+SWITCHES = "its voltage switches from sample to sample by a good part of the converter's range"
 _GROWS = "the loop is not stable: a deviation grows"
 _FAR = 1e9  # mm: an axis that has gone as far does not come back
 _GRID = 1 << 16
@@ -102,6 +107,19 @@ def switches(command: np.ndarray, limit: float) -> bool:
     return not np.isfinite(changes).all() or bool(np.sqrt(np.mean(changes**2)) >= _CHATTERS * limit)
 
 
+def switches_again(command: np.ndarray, limit: float) -> bool:
+    """Whether a part of a voltage (V) switches as a relay, again and again, once it is cut at `limit` (V)."""
+    changes = np.diff(np.clip(command, -limit, limit))
+    jumps = np.count_nonzero(np.abs(changes) >= _CHATTERS * limit)
+    return bool(jumps >= _FEW_JUMPS and np.sqrt(np.mean(changes**2)) >= _CHATTERS * limit)
+
+
+def _runs_away(command: np.ndarray, limit: float) -> bool:
+    """Whether a voltage (V) is often at the converter's `limit`, or at one of its own, as that of an unstable loop."""
+    at_end = (command == command.max()) | (command == command.min()) | (np.abs(command) >= _AT_LIMIT * limit)
+    return bool(at_end.mean() >= _OFTEN)
+
+
 @np.errstate(over="ignore", invalid="ignore")  # of voltages that no converter has
 def linear_loop(
     voltage: np.ndarray, position: np.ndarray, command: np.ndarray, limit: float, model: Model, T: float
@@ -116,64 +134,75 @@ def linear_loop(
     if not np.any(voltage):
         return NoLoop("its voltage does not depend on the measured position: there is no loop", True)
     if np.isfinite(voltage).all():
-        whole = _best(voltage, position, slice(None), model, T, _PARTS)
+        about = _Answer(voltage, position, command + voltage, limit, model, T)
+        whole = about.best(slice(None), _PARTS)
         if whole is not None:
             return whole
+        if any(switches_again(part, limit) for part in np.array_split(command, _PARTS)):
+            return NoLoop(SWITCHES, True)
         edges = np.linspace(0, len(voltage), _QUARTERS + 1).astype(int)
-        loops = [
-            loop for a, b in pairwise(edges) for loop in _of_part(voltage, position, slice(int(a), int(b)), model, T)
-        ]
+        quarters = [slice(int(a), int(b)) for a, b in pairwise(edges)]
+        loops = [loop for quarter in quarters for loop in about.of_part(quarter)]
         if unstable := next((loop for loop in loops if isinstance(loop, NoLoop)), None):
             return unstable
         if loops:
             return min((loop for loop in loops if isinstance(loop, LinearLoop)), key=lambda loop: loop.margins[2])
     if switches(command, limit):
-        return NoLoop("its voltage switches from sample to sample by a good part of the converter's range", True)
+        return NoLoop(SWITCHES, True)
     return NoLoop("no linear law answers a force as it does, not even nearly", False)
 
 
-def _of_part(
-    voltage: np.ndarray, position: np.ndarray, part: slice, model: Model, T: float
-) -> Iterator[LinearLoop | NoLoop]:
-    """The loop of the law in this part; where it has none, those of what is exactly a linear law in parts of it."""
-    loop = _best(voltage, position, part, model, T, 1)
-    if loop is not None:
-        yield loop
-        return
-    todo = [part]
-    while todo:
-        part = todo.pop()
-        if min(len(np.unique(each[part])) for each in (voltage, position)) < _VALUES:  # held, as it is rounded: no law
-            continue
-        for fit in law_fits(voltage, position, part, exactly=True):
+@dataclass(frozen=True)
+class _Answer:
+    """How a law answers a force: deviations `voltage` (V) and `position` (mm); the `command` (V) under the force."""
+
+    voltage: np.ndarray
+    position: np.ndarray
+    command: np.ndarray
+    limit: float
+    model: Model
+    T: float
+
+    def of_part(self, part: slice) -> Iterator[LinearLoop | NoLoop]:
+        """The loop of the law in this part; where it has none, those of what is exactly a linear law in parts of it."""
+        loop = self.best(part, 1)
+        if loop is not None:
+            yield loop
+            return
+        todo = [part]
+        while todo:
+            part = todo.pop()
+            if min(len(np.unique(each[part])) for each in (self.voltage, self.position)) < _VALUES:
+                continue  # held, as it is rounded: no law
+            for fit in law_fits(self.voltage, self.position, part, exactly=True):
+                if fit.is_exact:
+                    loop = closed(fit, self.model, self.T)
+                    if isinstance(loop, LinearLoop) or loop.why == _GROWS:  # else nothing was measured in this part
+                        yield loop
+                    break
+            else:
+                if (length := part.stop - part.start) >= _SHORTEST:
+                    middle = part.start + length // 2
+                    todo += [slice(part.start, middle), slice(middle, part.stop)]
+
+    def best(self, part: slice, parts: int) -> LinearLoop | NoLoop | None:
+        """The loop of the law that fits this part; NoLoop where that is surely unstable; None where none fits."""
+        found: list[tuple[float, LinearLoop | NoLoop]] = []
+        for fit in law_fits(self.voltage, self.position, part):
+            if fit.departure > MOST or departure(fit, self.voltage, self.position, part, parts) > MOST_IN_A_PART:
+                continue
+            loop = closed(fit, self.model, self.T)
             if fit.is_exact:
-                loop = closed(fit, model, T)
-                if isinstance(loop, LinearLoop) or loop.why == _GROWS:  # else nothing was measured during this part
-                    yield loop
-                break
-        else:
-            if (length := part.stop - part.start) >= _SHORTEST:
-                middle = part.start + length // 2
-                todo += [slice(part.start, middle), slice(middle, part.stop)]
-
-
-def _best(
-    voltage: np.ndarray, position: np.ndarray, part: slice, model: Model, T: float, parts: int
-) -> LinearLoop | NoLoop | None:
-    """The loop of the law that fits this part; NoLoop where all that fit are unstable; None where none fits."""
-    found: list[tuple[float, LinearLoop | NoLoop]] = []
-    for fit in law_fits(voltage, position, part):
-        if fit.departure > MOST or departure(fit, voltage, position, part, parts) > MOST_IN_A_PART:
-            continue
-        loop = closed(fit, model, T)
-        if fit.is_exact:
-            return loop
-        found.append((fit.departure, loop))
-    stable = [each for each in found if isinstance(each[1], LinearLoop)]
-    if not stable:
-        return found[0][1] if found else None
-    least = min(share for share, _ in stable)
-    return next(loop for share, loop in stable if share <= _SIMPLER * least)
+                return loop
+            found.append((fit.departure, loop))
+        stable = [each for each in found if isinstance(each[1], LinearLoop)]
+        if stable:
+            least = min(share for share, _ in stable)
+            return next(loop for share, loop in stable if share <= _SIMPLER * least)
+        if not found:
+            return None
+        share, unstable = min(found, key=itemgetter(0))
+        return unstable if share <= _SURELY or _runs_away(self.command[part], self.limit) else None
 
 
 def closed(fit: LawFit, model: Model, T: float) -> LinearLoop | NoLoop:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from rds.grading.intake.archives import files_in_own
-from rds.grading.intake.items import Item, Refusal
+from rds.grading.intake.items import Item, Refusal, refusal
 from rds.grading.intake.layouts import StudentFiles
 from rds.grading.intake.names import shown
 
@@ -29,8 +29,8 @@ def chosen(handed: StudentFiles, accepted: Sequence[str]) -> Item:
         raise NothingToGrade("nothing was handed in")
     candidates = [item for item in files if item.is_code]
     if not candidates:
-        if fault := next((item.fault for item in files if item.fault), ""):
-            raise Refusal(fault)
+        if bad := next((item for item in files if item.fault), None):
+            raise refusal(bad.fault, bad.is_unreadable)
         names = ", ".join(sorted(shown(item.name) for item in files)[:5])
         raise NothingToGrade(f"there is no .py or .ipynb file in what was handed in ({names})")
     outermost = min(len(item.parts) for item in candidates)
@@ -46,7 +46,7 @@ def chosen(handed: StudentFiles, accepted: Sequence[str]) -> Item:
         others = ", ".join(sorted(shown("/".join(item.parts)) for item in among if item is not found[0])[:5])
         handed.notes.append(f"{shown('/'.join(found[0].parts))} is graded, and not {others}")
     if found[0].fault:
-        raise Refusal(found[0].fault)
+        raise refusal(found[0].fault, found[0].is_unreadable)
     return found[0]
 
 

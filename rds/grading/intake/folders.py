@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from collections import Counter
@@ -10,10 +11,12 @@ from functools import partial
 from pathlib import Path
 
 from rds.core.errors import InputError
-from rds.grading.intake.items import CODE, DEEPEST, MOST_FILES, Item, Refusal, faulty, is_clutter
+from rds.grading.intake.items import CODE, DEEPEST, MOST_FILES, Item, Refusal, Unreadable, faulty, is_clutter, refusal
 from rds.grading.intake.names import shown
 from rds.grading.sandbox.submission import UNFOLLOWED
 
+_NOT_FOR_US = {errno.EACCES, errno.EPERM, errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EMFILE, errno.ENFILE}
+_REMEDY = "who grades must be able to read it; then go on with --resume"
 _KINDS = {
     stat.S_IFLNK: "a link",
     stat.S_IFIFO: "a pipe (FIFO)",
@@ -41,12 +44,12 @@ def files_below(folder: Path) -> tuple[list[Item], list[str]]:
 
 
 def read_regular(path: str | Path, most: int) -> bytes:
-    """At most `most` bytes of a regular file; Refusal for anything else."""
+    """At most `most` bytes of a regular file; Refusal for anything else, Unreadable where the computer is at fault."""
     try:
         descriptor = os.open(path, UNFOLLOWED)
     except (OSError, ValueError) as error:
         said = error.strerror if isinstance(error, OSError) else str(error)
-        raise Refusal(f"it cannot be opened: {said}") from None
+        raise _fault("it cannot be opened", said, isinstance(error, OSError) and error.errno in _NOT_FOR_US) from None
     with os.fdopen(descriptor, "rb") as file:
         about = os.fstat(file.fileno())
         if not stat.S_ISREG(about.st_mode):
@@ -56,10 +59,14 @@ def read_regular(path: str | Path, most: int) -> bytes:
         try:
             data = file.read(most + 1)
         except OSError as error:
-            raise Refusal(f"it cannot be read: {error.strerror}") from None
+            raise Unreadable(f"it cannot be read: {error.strerror}; {_REMEDY}") from None
     if len(data) > most:
         raise Refusal(f"it has more than {most} bytes; keep data out of it")
     return data
+
+
+def _fault(what: str, said: str | None, is_unreadable: bool) -> Refusal:
+    return refusal(f"{what}: {said}; {_REMEDY}" if is_unreadable else f"{what}: {said}", is_unreadable)
 
 
 def _walk(folder: Path, parts: tuple[str, ...]) -> Iterator[Item]:
@@ -69,7 +76,7 @@ def _walk(folder: Path, parts: tuple[str, ...]) -> Iterator[Item]:
     except OSError as error:
         if not parts:
             raise InputError(f"cannot be read: {error.strerror}; check the path", str(folder)) from error
-        yield faulty(parts, f"its folder cannot be opened: {error.strerror}")
+        yield faulty(parts, f"its folder cannot be opened: {error.strerror}; {_REMEDY}", is_unreadable=True)
         return
     for entry in names:
         inner = (*parts, entry.name)

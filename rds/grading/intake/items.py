@@ -19,19 +19,25 @@ class Refusal(Exception):
     """Why a file is not opened: a sentence for its author."""
 
 
+class Unreadable(Refusal):
+    """The computer does not give the file to who grades: the author has done nothing wrong."""
+
+
 @dataclass(frozen=True, slots=True)
 class Item:
     """A file as it was found; nothing of it has been read.
 
     `parts` are the names of its folders and its own, below the place that was searched. `read(most)` gives its bytes,
     Refusal if there are more than `most`, or none can be had. `fault` says why it is not to be read at all. `time` is
-    what the place says of when it came there, without a time zone where none is known.
+    what the place says of when it came there, without a time zone where none is known. `is_unreadable`: whether the
+    `fault` is that of who grades, and not the author's.
     """
 
     parts: tuple[str, ...]
     read: Callable[[int], bytes]
     time: datetime | None = None
     fault: str = ""
+    is_unreadable: bool = False
 
     @property
     def name(self) -> str:
@@ -54,10 +60,15 @@ def is_clutter(parts: tuple[str, ...]) -> bool:
     return not _CLUTTER.isdisjoint(parts) or parts[-1].startswith("._")
 
 
-def faulty(parts: tuple[str, ...], fault: str) -> Item:
+def faulty(parts: tuple[str, ...], fault: str, is_unreadable: bool = False) -> Item:
     """An item that is not to be read."""
 
     def refuse(most: int) -> bytes:
-        raise Refusal(fault)
+        raise refusal(fault, is_unreadable)
 
-    return Item(parts, refuse, fault=fault)
+    return Item(parts, refuse, fault=fault, is_unreadable=is_unreadable)
+
+
+def refusal(fault: str, is_unreadable: bool) -> Refusal:
+    """To be raised for an item with this fault."""
+    return Unreadable(fault) if is_unreadable else Refusal(fault)

@@ -99,8 +99,13 @@ class _Sorting:
         self._zipped = zipped
         self._by_student: dict[str, StudentFiles] = {}
         self._ignored: list[str] = []
+        self._files: dict[str, str] = {}  # by student the name of a file that is called like the student
+        self._in_folders: set[str] = set()  # students with a folder that holds code
 
     def layout(self, name: str, times: Item | None) -> Layout:
+        for student in self._in_folders & self._files.keys():
+            said = f"{self._files[student]} lies beside a folder of the same name, and both are taken for one student's"
+            self._by_student[student].notes.append(said)
         by_student = sorted(self._by_student.values(), key=lambda handed: handed.student)
         return Layout(name, by_student, times, tuple(self._ignored))
 
@@ -111,10 +116,15 @@ class _Sorting:
     def plain(self, item: Item) -> None:
         """A file in a student's folder, or one that is called like its student."""
         if len(item.parts) > 1:
-            self.files_of(item.parts[0]).items.append(replace(item, parts=item.parts[1:]))
+            handed = self.files_of(item.parts[0])
+            handed.items.append(replace(item, parts=item.parts[1:]))
+            if item.is_code or item.is_archive:
+                self._in_folders.add(handed.student)
         elif item.is_code or item.is_archive or item.fault:
             stem = item.name[: item.name.rindex(".")] if item.is_code or item.is_archive else item.name
-            self.files_of(stem or item.name).items.append(item)
+            handed = self.files_of(stem or item.name)
+            handed.items.append(item)
+            self._files[handed.student] = shown(item.name)
         else:
             self._ignored.append(shown(item.name))
 

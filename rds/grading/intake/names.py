@@ -7,16 +7,18 @@ import re
 
 _PLAIN = re.compile(r"[a-z0-9][a-z0-9_-]{0,59}")
 _RESERVED = re.compile(r"con|prn|aux|nul|com\d|lpt\d")  # that Windows keeps for devices
+_ESCAPED = frozenset("\\\u115f\u1160\u2800\u3164\uffa0")  # the backslash, and what leaves white paper
 _LONGEST = 200  # characters of an identifier that is shown
 
 
 def shown(name: str) -> str:
     """`name` in printable characters on one line; different names stay different.
 
-    What is not printable (control characters, marks that turn the direction of writing, bytes that are no text) is
-    written as Python writes it, and so is the backslash itself.
+    What is not printable (control characters, marks that turn the direction of writing, bytes that are no text), or
+    leaves no mark, is written as Python writes it, and so is the backslash itself.
     """
-    text = "".join(each if each.isprintable() and each != "\\" else _escaped(each) for each in name)
+    text = "".join(each if each.isprintable() and each not in _ESCAPED else _escaped(each) for each in name)
+    text = text if text.strip() else text.replace(" ", "\\x20")
     if len(text) <= _LONGEST:
         return text
     return f"{text[: _LONGEST - 20]}…{_digest(name)}"

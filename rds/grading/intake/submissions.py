@@ -19,7 +19,7 @@ from rds.grading.intake import notebooks
 from rds.grading.intake.archives import files_in
 from rds.grading.intake.choose import NothingToGrade, chosen
 from rds.grading.intake.folders import files_below, read_regular
-from rds.grading.intake.items import CODE, Item, Refusal
+from rds.grading.intake.items import CODE, Item, Refusal, Unreadable
 from rds.grading.intake.layouts import StudentFiles, sorted_out
 from rds.grading.intake.names import shown
 from rds.grading.intake.times import listed_times, stamped_time, with_zone
@@ -100,12 +100,17 @@ def _row(handed: StudentFiles, accepted: Sequence[str], listed: datetime | None,
     except NothingToGrade as error:
         status, reason = Status.MISSING, str(error)
     except Refusal as error:
-        status, reason = Status.REFUSED, str(error)
+        status, reason = status_of(error), str(error)
     if when is None and item is not None and handed.has_times:
         when = with_zone(item.time, zone)
     name = "" if item is None else shown(item.name)
     read = bytes if item is None else _reader(item)
     return HandedIn(handed.student, name, read, status, reason, when, tuple(handed.notes), handed.source)
+
+
+def status_of(error: Refusal) -> Status:
+    """Of a student whose file is not opened: what the computer keeps from who grades is not the student's fault."""
+    return Status.GRADER_ERROR if isinstance(error, Unreadable) else Status.REFUSED
 
 
 def _reader(item: Item) -> Callable[[], bytes]:

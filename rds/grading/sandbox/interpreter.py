@@ -95,6 +95,7 @@ class Interpreter:
 
 
 MODULES: Mapping[str, tuple[str, ...]] = {
+    "matplotlib": ("matplotlib.pyplot",),  # which python-control has imported anyway
     "scipy": ("scipy.signal", "scipy.linalg", "scipy.optimize", "scipy.integrate", "scipy.interpolate"),
 }
 """What is imported of a package; the package itself if nothing is said."""

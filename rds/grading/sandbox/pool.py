@@ -17,7 +17,7 @@ from rds.grading.sandbox.submission import read_submission
 from rds.grading.sandbox.supervise import Supervisor
 from rds.grading.sandbox.user import sandbox_user
 
-KITS = (("numpy",), ("numpy", "scipy"), ("numpy", "scipy", "control"))
+KITS = (("numpy",), ("numpy", "scipy"), ("numpy", "scipy", "control", "matplotlib"))
 """What warm interpreters have imported; a submission gets the first that has all it imports."""
 
 

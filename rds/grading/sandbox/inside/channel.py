@@ -8,7 +8,10 @@ from typing import Any
 
 from rds.grading.sandbox import frames
 from rds.grading.sandbox.door import Closed, Door
+from rds.grading.sandbox.inside import walls
 from rds.grading.sandbox.records import Layout
+
+_LONGEST = 2000  # characters of an error
 
 Receive = Callable[[], tuple[Any, ...]]
 Send = Callable[..., None]
@@ -51,3 +54,8 @@ class Channel:
     def tell(self, value: Any) -> None:
         """`value` as a frame."""
         self.send(frames.encode(value))
+
+    def tell_error(self, said: str) -> None:
+        """What went wrong, for the submission's author. Half a character in it, which no file can hold, becomes `?`."""
+        whole = said.replace(f"{walls.HOME}/", "").encode("utf-8", "replace").decode()
+        self.tell({"error": whole[:_LONGEST]})

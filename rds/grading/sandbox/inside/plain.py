@@ -27,7 +27,13 @@ def _plain(value: Any, depth: int, left: list[int]) -> Any:
         raise NotPlain(f"it holds more than {MOST} values")
     if depth > DEEPEST:
         raise NotPlain(f"it has more than {DEEPEST} lists inside each other")
-    if value is None or type(value) in (bool, str):
+    if value is None or type(value) is bool:
+        return value
+    if type(value) is str:
+        try:
+            value.encode()
+        except UnicodeEncodeError:
+            raise NotPlain("it holds a text with half a character (a surrogate), which no file can hold") from None
         return value
     if isinstance(value, np.ndarray | np.generic):
         if value.dtype.kind not in "fiub":
@@ -46,5 +52,5 @@ def _plain(value: Any, depth: int, left: list[int]) -> Any:
     if isinstance(value, dict):
         if not all(type(key) is str for key in value):
             raise NotPlain("it holds a dict whose keys are not all texts")
-        return {key: _plain(part, depth + 1, left) for key, part in value.items()}
+        return {_plain(key, depth, left): _plain(part, depth + 1, left) for key, part in value.items()}
     raise NotPlain(f"it holds a {type(value).__name__}")

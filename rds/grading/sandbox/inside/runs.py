@@ -18,7 +18,6 @@ from rds.core.load import StudentFile
 from rds.core.types import ArcSegment, LineSegment, Reference, Segment
 from rds.core.values import shown
 from rds.grading.sandbox import records
-from rds.grading.sandbox.inside import walls
 from rds.grading.sandbox.inside.channel import Channel, Receive, Send
 from rds.grading.sandbox.inside.counting import Counted
 from rds.machines.converter import as_voltage
@@ -188,7 +187,7 @@ def _refuse(channel: Channel, error: BaseException, student: StudentFile, counte
     if counted:
         counted.stop()
         error = first_cause(error)
-    channel.tell({"error": _said(error, student)})
+    channel.tell_error(_said(error, student))
 
 
 def _explain(channel: Channel, error: BaseException, student: StudentFile, t: float, counted: Counted | None) -> None:
@@ -196,9 +195,8 @@ def _explain(channel: Channel, error: BaseException, student: StudentFile, t: fl
         counted.stop()
         error = first_cause(error)
     said = _said(error, student)
-    channel.tell({"error": said if f"t = {t:.3f}" in said else f"at t = {t:.3f} s: {said}"})
+    channel.tell_error(said if f"t = {t:.3f}" in said else f"at t = {t:.3f} s: {said}")
 
 
 def _said(error: BaseException, student: StudentFile) -> str:
-    said = str(error) if isinstance(error, InputError) else student_error(error, student.source)
-    return said.replace(f"{walls.HOME}/", "")[:2000]
+    return str(error) if isinstance(error, InputError) else student_error(error, student.source)

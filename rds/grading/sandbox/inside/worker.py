@@ -90,7 +90,7 @@ def _load(channel: Channel, kind: str, file: Path, count: Counted | None) -> Stu
             count.stop()
             cause = runs.first_cause(error)
         said = str(cause) if isinstance(cause, InputError) else student_error(cause, file)
-        channel.tell({"error": said.replace(f"{walls.HOME}/", "")[:2000]})
+        channel.tell_error(said)
         return None
     given = loaded if isinstance(loaded, StudentFile) else None
     found = given.functions if given else vars(loaded)
@@ -137,11 +137,11 @@ def _call(channel: Channel, loaded: Any, order: dict[str, Any], file: Path) -> N
     functions = loaded.functions if isinstance(loaded, StudentFile) else vars(loaded)
     name = order["name"]
     if not callable(functions.get(name)):
-        channel.tell({"error": f"it defines no function {name}()"})
+        channel.tell_error(f"it defines no function {name}()")
         return
     try:
         channel.tell({"value": plain(functions[name](*order["args"]))})
     except NotPlain as fault:
-        channel.tell({"error": f"{name}() returned what is not made of numbers, texts and lists: {fault}"})
+        channel.tell_error(f"{name}() returned what is not made of numbers, texts and lists: {fault}")
     except BaseException as error:
-        channel.tell({"error": f"{name}() failed: {student_error(error, file)}".replace(f"{walls.HOME}/", "")[:2000]})
+        channel.tell_error(f"{name}() failed: {student_error(error, file)}")
