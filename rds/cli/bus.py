@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -334,7 +335,12 @@ def _counter(what: str) -> Iterator[Any]:
     from rich.status import Status
 
     with Status(f"0 {what}", console=Console(stderr=True)) as status:
-        yield lambda number: status.update(f"{number} {what}")
+
+        def show(number: int) -> None:
+            with contextlib.suppress(OSError):  # the terminal has been closed: what is done here is still finished
+                status.update(f"{number} {what}")
+
+        yield show
 
 
 def _say(sentence: str) -> None:

@@ -169,16 +169,12 @@ def progress_bars() -> Iterator[Callable[[str], Callable[[int, int], None]]]:
 
 @contextmanager
 def until_ctrl_c() -> Iterator[threading.Event]:
-    """An event that Ctrl-C and a polite kill set."""
-    from rds.core.interrupt import SignalEvent
+    """An event that Ctrl-C, a polite kill and a closed terminal set."""
+    from rds.core.interrupt import SignalEvent, set_by_signals
 
     stop = SignalEvent()
-    before = {number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
+    with set_by_signals(stop):
         yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

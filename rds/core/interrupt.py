@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -155,3 +156,21 @@ class SignalEvent(threading.Event):
                 break
             time.sleep(left)
         return self._was_set
+
+
+@contextlib.contextmanager
+def set_by_signals(stop: threading.Event) -> Iterator[None]:
+    """Ctrl-C, a polite kill and a closed terminal set the event, so that what waits for it ends in order.
+
+    In a main thread only. Under nohup the end of the terminal stays ignored.
+    """
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    hangup = getattr(signal, "SIGHUP", None)  # not on Windows
+    if hangup is not None and signal.getsignal(hangup) is not signal.SIG_IGN:
+        numbers.append(hangup)
+    before = {number: signal.signal(number, lambda *_: stop.set()) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

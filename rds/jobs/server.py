@@ -37,10 +37,14 @@ class Server:
         self._strangers: dict[asyncio.StreamWriter, None] = {}  # in order
 
     async def serve(self, listener: Any, ready: Callable[[], None]) -> None:
-        """Until SIGINT or SIGTERM; then what runs is stopped."""
+        """Until SIGINT, SIGTERM or the end of its terminal (SIGHUP, but under nohup); then what runs is stopped."""
         stop = asyncio.Event()
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
+        numbers = [signal.SIGINT, signal.SIGTERM]
+        hangup = getattr(signal, "SIGHUP", None)  # not on Windows
+        if hangup is not None and signal.getsignal(hangup) is not signal.SIG_IGN:
+            numbers.append(hangup)
+        for number in numbers:
             with suppress(NotImplementedError):  # Windows: Ctrl-C ends asyncio.run
                 loop.add_signal_handler(number, stop.set)
         start = asyncio.start_server if self._address.path is None else asyncio.start_unix_server

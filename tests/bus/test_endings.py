@@ -76,6 +76,18 @@ def test_a_killed_reader_holds_nobody_up(start: Callable[..., Any], hub: Callabl
         bus.send(numbered(k), timeout=0.8 * STALL)
 
 
+def test_a_hub_that_stands_still_is_named(hub: Callable[..., Any], open_bus: Opener) -> None:
+    process = hub("test")
+    bus = open_bus()
+    os.kill(process.pid, signal.SIGSTOP)
+    try:
+        with pytest.raises(can.CanTimeoutError, match=rf"the hub \(process {process.pid}\) stands still"):
+            for k in range(100_000):
+                bus.send(numbered(k), timeout=0.0)
+    finally:
+        os.kill(process.pid, signal.SIGCONT)
+
+
 def test_a_stopped_reader_is_let_go_and_told_why(
     start: Callable[..., Any], hub: Callable[..., Any], open_bus: Opener
 ) -> None:

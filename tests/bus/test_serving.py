@@ -41,6 +41,14 @@ def test_every_dialect_plays_a_schedule_of_faults(dialect: str, program: Callabl
     assert wrong.wait(30) == 2 and f"{schedule}, line 2" in wrong.stderr.read()
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no terminal that hangs up")
+def test_a_closed_terminal_ends_a_server_in_order(dialect: str, program: Callable[..., Any]) -> None:
+    server = program(server_module(dialect), "mini-cnc", "--channel", "m", "--axes", "X")
+    assert server.stdout.readline().startswith("ready")
+    server.send_signal(signal.SIGHUP)
+    assert server.wait(30) == 0
+
+
 def test_faults_need_the_built_in_bus(dialect: str, tmp_path: Path) -> None:
     from rds.bus.medium.fault_file import read_faults
 

@@ -373,6 +373,31 @@ def test_a_full_disk_is_said(tmp_path: Path) -> None:
         log.flush()
 
 
+@pytest.mark.parametrize("ending", ["asc", "blf", "log", "trc", "csv", "db"])
+def test_a_disk_that_becomes_full_leaves_a_log_that_opens(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{ending}"
+    program = (
+        "import random, resource, signal, sys; sys.path.insert(0, sys.argv[2])\n"
+        "from bus_tools.made_frames import frame; from rds.bus.tools.logs import LogWriter\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (30_011, 30_011))\n"
+        "log, chance = LogWriter(sys.argv[1]), random.Random(1)\n"
+        "try:\n"
+        "    for k in range(20_000):\n"
+        "        log.write(frame(k % 2048, chance.randbytes(8), k / 1000))\n"
+        "        if k % 40 == 39: log.flush()\n"
+        "except OSError:\n"
+        "    try: log.close()\n"
+        "    finally: print('full at', k)\n"
+    )
+    here = str(Path(__file__).resolve().parents[1])
+    ran = subprocess.run([sys.executable, "-c", program, str(path), here], capture_output=True, text=True, check=False)
+    assert "full at" in ran.stdout, ran.stderr
+    kept = [message.arbitration_id for message in LogFile(path)]
+    assert kept == [k % 2048 for k in range(len(kept))]
+    assert len(kept) > int(ran.stdout.split()[-1]) - 300  # without what came since the last flush, or was in a buffer
+
+
 @pytest.mark.parametrize("ending", ["blf", "log", "db", "csv.gz"])
 def test_a_log_has_one_writer_at_a_time(ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"a.{ending}"

@@ -216,6 +216,23 @@ def test_a_killed_recorder_leaves_what_it_took(tmp_path: Path, open_bus: Opener)
     assert len(list(LogFile(path))) == 100
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no terminal that hangs up")
+def test_a_closed_terminal_ends_a_recording_whole(tmp_path: Path, open_bus: Opener) -> None:
+    path = tmp_path / "a.log"
+    command = [sys.executable, "-m", "rds.cli.bus", "record", str(path), "--channel", "test"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert "recording" in process.stderr.readline()
+        bus = open_bus()
+        for message in spaced(100):
+            bus.send(message)
+        wait_for(lambda: (frames_in(path) or 0) > 0)
+        process.send_signal(signal.SIGHUP)
+        said, problems = process.communicate(timeout=60)
+    assert process.returncode == 0, problems
+    assert said.startswith(f"{frames_in(path)} frames")
+
+
 # --- replaying
 
 

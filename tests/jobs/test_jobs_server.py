@@ -240,3 +240,10 @@ def test_the_document_names_every_request() -> None:
     for verb, table in VERBS.items():
         row = next(line for line in text.splitlines() if line.startswith(f"| `{verb}` |"))
         assert all(f"`{key}`" in row for key in table.keys), verb
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no terminal that hangs up")
+def test_a_closed_terminal_ends_the_server_in_order(serve: Callable[..., Server]) -> None:
+    server = serve()
+    server.process.send_signal(signal.SIGHUP)
+    assert server.process.wait(60.0) == 0

@@ -234,7 +234,7 @@ class BuiltinBus(can.BusABC):
     def _obstacle(self) -> str:
         """Why frames wait."""
         if self._error_states is None:
-            return "a node does not read its frames"
+            return f"a node does not read its frames, or the hub (process {self.hub_pid}) stands still"
         if self._error_states.state() == ErrorState.PASSIVE:
             return "the node is error passive: nobody acknowledges its frames, or all are disturbed"
         return "the bus is busy with other frames, or a node does not read its frames"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import gc
 import logging
-import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -23,7 +22,7 @@ from rds.bus.medium.fault_kinds import Fault
 from rds.bus.modules.shared_bus import opener_of
 from rds.bus.tools.link import BUILTIN, bus_name, default_channel
 from rds.core.errors import InputError
-from rds.core.interrupt import SignalEvent
+from rds.core.interrupt import SignalEvent, set_by_signals
 from rds.core.scheduling import lock_memory, raise_priority
 from rds.machines import Machine
 from rds.machines.machine import Axis
@@ -93,7 +92,7 @@ def serve_nodes(
     The nodes are appended to `nodes`; `chores` is called with them now and then (where an interface can't be
     waited for together with others, at the price of asking it every 2 ms); `exact` is for nodes whose instants
     matter to less than 1 ms. In a process's main thread it takes real-time priority where permitted, and ends on
-    SIGTERM and SIGINT.
+    SIGTERM, SIGINT and SIGHUP.
 
     Raises MachineError if the bus can't be opened at the start, InputError for an unknown axis, and for faults on
     another bus than the built-in one.
@@ -142,15 +141,13 @@ def as_process(stop: threading.Event) -> Iterator[None]:
         yield
         return
     LOG.info("%s; memory locked: %s", raise_priority(PRIORITY), lock_memory())
-    before = [(number, signal.signal(number, lambda *_: stop.set())) for number in (signal.SIGTERM, signal.SIGINT)]
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
-        for number, handler in before:
-            signal.signal(number, handler)
+    with set_by_signals(stop):
+        gc.collect()
+        gc.freeze()
+        try:
+            yield
+        finally:
+            gc.unfreeze()
 
 
 def _until(

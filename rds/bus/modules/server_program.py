@@ -1,7 +1,7 @@
 """The program around a server, the same for every dialect: its options, its one line on stdout, its end.
 
-It writes "ready ..." when all modules are on the bus, and reports on stderr. It ends on SIGTERM and SIGINT; with
---exit-with-stdin also when its starter has gone and nobody commands.
+It writes "ready ..." when all modules are on the bus, and reports on stderr. It ends on SIGTERM, SIGINT and
+SIGHUP; with --exit-with-stdin also when its starter has gone and nobody commands.
 """
 
 from __future__ import annotations

@@ -1,8 +1,14 @@
-"""python-can's log writers, each with a `flush()` after which a killed recording can be read."""
+"""python-can's log writers, each with a `flush()` after which a killed recording can be read.
+
+A disk that becomes full leaves half of a line or of a container at the end of a file, which no reader takes;
+`abandon()` cuts it off.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import gzip
+import os
 import sqlite3
 from pathlib import Path
 from typing import Any, Protocol, TextIO, cast
@@ -12,6 +18,7 @@ import can
 from rds.bus.tools.mf4 import asammdf_missing, bring_asammdf
 from rds.core.private_files import open_private
 
+_LONGEST_LINE = 4096  # bytes, and more than any frame's
 _LEAST_EPOCH = 631152000.0  # s; BLF keeps no start before 1990
 
 
@@ -21,6 +28,7 @@ class Writer(Protocol):
     def on_message_received(self, msg: can.Message) -> None: ...
     def flush(self) -> None: ...
     def stop(self) -> None: ...
+    def abandon(self) -> None: ...  # after an OSError: close the file, and leave of it what can be read
 
 
 def open_writer(path: Path, ending: str, packed: bool) -> Writer:
@@ -33,7 +41,7 @@ def open_writer(path: Path, ending: str, packed: bool) -> Writer:
         return _Mf4Writer(path)
     how: dict[str, Any] = {"mode": "wt", "encoding": "utf-8", "newline": "\n"}  # the same on every system
     file = cast(TextIO, gzip.open(path, **how) if packed else path.open(**how))  # noqa: SIM115
-    return TextWriter(file, ending)
+    return TextWriter(file, ending, None if packed else path)
 
 
 class CandumpWriter(can.CanutilsLogWriter):
@@ -49,16 +57,16 @@ class CandumpWriter(can.CanutilsLogWriter):
 
 
 class TextWriter:
-    """ASC, candump, TRC and CSV."""
+    """ASC, candump, TRC and CSV. `path` is where whole lines are the text's own: not where it is compressed."""
 
-    def __init__(self, file: TextIO, ending: str):
+    def __init__(self, file: TextIO, ending: str, path: Path | None):
         kinds: dict[str, Any] = {
             ".asc": can.ASCWriter,
             ".log": CandumpWriter,
             ".trc": can.TRCWriter,
             ".csv": can.CSVWriter,
         }
-        self._file = file
+        self._file, self._path = file, path
         self._writer = kinds[ending](file)
         self.on_message_received = self._writer.on_message_received
 
@@ -71,6 +79,16 @@ class TextWriter:
         if not self._file.closed:
             self._writer.stop()
 
+    def abandon(self) -> None:
+        """Leave whole lines."""
+        with contextlib.suppress(OSError):  # it tries to write what waits once more
+            self._file.close()
+        if self._path is not None and self._path.is_file():  # no device and no pipe
+            with self._path.open("rb+") as file:
+                start = max(0, file.seek(0, os.SEEK_END) - _LONGEST_LINE)
+                file.seek(start)
+                file.truncate(start + file.read().rfind(b"\n") + 1)
+
 
 class BlfWriter:
     """BLF keeps its start time and object count in a header that is written at the end, so each flush ends the file."""
@@ -81,6 +99,7 @@ class BlfWriter:
         self._shift: float | None = None  # s
         self._stopped = False
         self._new = False  # since the last flush
+        self._whole = 0  # bytes of the file as the last flush left it
 
     def on_message_received(self, msg: can.Message) -> None:
         """Add a frame."""
@@ -95,6 +114,7 @@ class BlfWriter:
         if self._new:
             self._new = False
             self._writer.stop()
+            self._whole = self._path.stat().st_size
             self._writer = can.BLFWriter(self._path, append=True)
 
     def stop(self) -> None:
@@ -102,6 +122,14 @@ class BlfWriter:
         if not self._stopped:
             self._stopped = True
             self._writer.stop()
+
+    def abandon(self) -> None:
+        """Leave the file as the last flush left it."""
+        self._stopped = True
+        with contextlib.suppress(OSError):  # it tries to write what waits once more
+            self._writer.file.close()
+        if self._path.is_file():
+            os.truncate(self._path, self._whole)
 
 
 class DatabaseWriter:
@@ -153,6 +181,11 @@ class DatabaseWriter:
             self._connection.close()
             self._connection = None
 
+    def abandon(self) -> None:
+        """Leave what was committed."""
+        self._rows = []
+        self.stop()
+
     def _execute(self, statement: str, rows: list[tuple[object, ...]] | None = None) -> None:
         assert self._connection is not None, "the log is closed"
         try:
@@ -186,3 +219,7 @@ class _Mf4Writer:
         if not self._stopped:
             self._stopped = True
             self._writer.stop()
+
+    def abandon(self) -> None:
+        """Nothing that could be done."""
+        self._stopped = True

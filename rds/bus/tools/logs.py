@@ -215,7 +215,8 @@ class LogWriter:
     """A log that is being written. `unkept` counts, by their kind, the frames that the format cannot hold.
 
     Never overwrites an existing file without `force`, and none that another one is writing. Raises InputError for that
-    and for an unknown ending, OSError where the disk says no (whenever it says so).
+    and for an unknown ending, OSError where the disk says no (whenever it says so); the file then ends with what can be
+    read (not .mf4 and .gz).
     """
 
     def __init__(self, path: str | Path, force: bool = False):
@@ -251,17 +252,28 @@ class LogWriter:
         if message.timestamp < self._last:
             message.timestamp = self._last
         self._last = message.timestamp
-        self._writer.on_message_received(message)
+        try:
+            self._writer.on_message_received(message)
+        except OSError:
+            self._writer.abandon()
+            raise
         self.frames += 1
 
     def flush(self) -> None:
         """Bring everything so far to the disk, in a form that can be read if nothing more follows (not .mf4)."""
-        self._writer.flush()
+        try:
+            self._writer.flush()
+        except OSError:
+            self._writer.abandon()
+            raise
 
     def close(self) -> None:
         """Finish the file. May be called more than once."""
         try:
             self._writer.stop()
+        except OSError:
+            self._writer.abandon()
+            raise
         finally:
             log_lock.release(self._lock)
             self._lock = None
