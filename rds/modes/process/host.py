@@ -84,7 +84,7 @@ def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = Non
             except OSError as error:
                 raise InputError(
                     f"this run could not be recorded to its end ({error.strerror or error}); look whether the disk is "
-                    "full, or the folder was taken away while it went on; what is there can be opened",
+                    "full, or the folder was taken away while it went on; what was kept, if anything, can be opened",
                     str(directory),
                 ) from error
     return _here(plan, progress, live)
