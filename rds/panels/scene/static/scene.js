@@ -4,6 +4,7 @@
 const SPEEDS = [0.25, 0.5, 1, 2, 5, 20];
 const BEHIND = 0.15; // s that a picture is behind the newest row of a run that goes on
 const SOFT_MS = 100; // between two pictures where no graphics card draws them
+const FRAME_MS = 17; // the most that the browser takes to begin a picture that was asked for
 const MOST_TRAIL = 6000;
 const SLOWER = 20; // a spindle is drawn turning so many times slower
 
@@ -41,7 +42,7 @@ function render({ model, el }) {
 
   let painter = null, shapes = null, camera = null, failed = "";
   let columns = [], tips = [], wanted = [], errors = [], largest = 0; // by row, in the work's frame
-  let now = 0, playing = false, caughtUp = false, follows = true, stale = true, due = 0, drawn = 0, before = 0, pictures = 0, turned = 0, told = -1;
+  let now = 0, playing = false, caughtUp = false, follows = true, stale = true, due = 0, waits = 0, drawn = 0, before = 0, pictures = 0, turned = 0, told = -1;
   let stock = null, cutTo = 0, cutNow = true, intended = null;
 
   const first = () => (columns.length && columns[0].length ? columns[0][0] : 0);
@@ -199,7 +200,6 @@ function render({ model, el }) {
     due = 0;
     if (!model.get("shows") || !el.isConnected) return;
     const passed = Math.min((time - before) / 1000, 0.25);
-    if (painter?.soft && time - drawn < SOFT_MS) { wake(); return; }
     before = drawn = time;
     const live = model.get("live") && follows;
     if (live) { now = Math.min(now + passed, last()); if (last() - now > 3 * BEHIND) now = last() - BEHIND; }
@@ -210,7 +210,12 @@ function render({ model, el }) {
     if (playing) tellTime();
     if (playing || (live && now < last())) wake();
   }
-  function wake() { if (!due && !failed) due = requestAnimationFrame(frame); }
+  function wake() {
+    if (due || waits || failed) return;
+    const left = painter?.soft ? SOFT_MS - FRAME_MS - (performance.now() - drawn) : 0;
+    if (left > 0) waits = setTimeout(() => { waits = 0; wake(); }, left); // frames that draw nothing cost, too
+    else due = requestAnimationFrame(frame);
+  }
   function setOpen(open) { model.set("shows", open); model.save_changes(); shown(); if (open) model.send({ kind: "all" }); }
   function shown() {
     const open = model.get("shows");
@@ -283,7 +288,7 @@ function render({ model, el }) {
   }
   let place = null;
   const begun = requestAnimationFrame(() => { place = home(); place.addEventListener("rds-time", heard); restock(); greet(); shown(); if (model.get("shows")) model.send({ kind: "all" }); });
-  return () => { cancelAnimationFrame(begun); cancelAnimationFrame(due); sized.disconnect(); themed.disconnect(); model.off("msg:custom", receive); place?.removeEventListener("rds-time", heard); painter?.gl.getExtension("WEBGL_lose_context")?.loseContext(); };
+  return () => { cancelAnimationFrame(begun); cancelAnimationFrame(due); clearTimeout(waits); sized.disconnect(); themed.disconnect(); model.off("msg:custom", receive); place?.removeEventListener("rds-time", heard); painter?.gl.getExtension("WEBGL_lose_context")?.loseContext(); };
 }
 
 export default { render };
