@@ -158,17 +158,19 @@ class SignalEvent(threading.Event):
         return self._was_set
 
 
-@contextlib.contextmanager
-def set_by_signals(stop: threading.Event) -> Iterator[None]:
-    """Ctrl-C, a polite kill and a closed terminal set the event, so that what waits for it ends in order.
-
-    In a main thread only. Under nohup the end of the terminal stays ignored.
-    """
-    numbers = [signal.SIGINT, signal.SIGTERM]
+def ending_signals() -> list[signal.Signals]:
+    """What ends a program in order: Ctrl-C, a polite kill, and a closed terminal, which under nohup is ignored."""
+    found = [signal.SIGINT, signal.SIGTERM]
     hangup = getattr(signal, "SIGHUP", None)  # not on Windows
     if hangup is not None and signal.getsignal(hangup) is not signal.SIG_IGN:
-        numbers.append(hangup)
-    before = {number: signal.signal(number, lambda *_: stop.set()) for number in numbers}
+        found.append(hangup)
+    return found
+
+
+@contextlib.contextmanager
+def set_by_signals(stop: threading.Event) -> Iterator[None]:
+    """Each of `ending_signals` sets the event, so that what waits for it ends in order. In a main thread only."""
+    before = {number: signal.signal(number, lambda *_: stop.set()) for number in ending_signals()}
     try:
         yield
     finally:

@@ -9,13 +9,13 @@ from __future__ import annotations
 import asyncio
 import hmac
 import json
-import signal
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.installed import version
+from rds.core.interrupt import ending_signals
 from rds.jobs.address import Address
 from rds.jobs.job import OVER
 from rds.jobs.jobs import Jobs, sentence
@@ -40,11 +40,7 @@ class Server:
         """Until SIGINT, SIGTERM or the end of its terminal (SIGHUP, but under nohup); then what runs is stopped."""
         stop = asyncio.Event()
         loop = asyncio.get_running_loop()
-        numbers = [signal.SIGINT, signal.SIGTERM]
-        hangup = getattr(signal, "SIGHUP", None)  # not on Windows
-        if hangup is not None and signal.getsignal(hangup) is not signal.SIG_IGN:
-            numbers.append(hangup)
-        for number in numbers:
+        for number in ending_signals():
             with suppress(NotImplementedError):  # Windows: Ctrl-C ends asyncio.run
                 loop.add_signal_handler(number, stop.set)
         start = asyncio.start_server if self._address.path is None else asyncio.start_unix_server

@@ -52,7 +52,7 @@ SHARP = -0.866  # cosine of the turn (150°) from which a corner in mode BLEND i
 MOST_JOINED = 64  # lines
 TURN_SHARE = 0.3  # of the jerk, for changes of direction at joints on an exact path
 STOP_SHARE = 0.05  # of the feed: where a joint allows less, stopping costs no more time
-UNSURE = 1.06  # times the estimate: without it 0.9 % of random plans took longer than stopping everywhere, now 0.1 %
+UNSURE = 1.06  # times the estimate: 0.1 % of random plans take longer than stopping everywhere, without it 0.9 %
 LOST = 0.65  # at most, at turns of 40° to 145° on machines whose acceleration limits c: 0.25 to 0.66
 EXACT_STOP, BLEND, LINE = 1, 2, -1  # as in segments.py
 

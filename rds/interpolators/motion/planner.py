@@ -59,9 +59,10 @@ def plan(
         planner.take(getattr(block, "segments", block), getattr(block, "events", ()))
         yield from planner.run(final=False)
         shown.hand_on()
-    if planner.least_stopping() <= MOST_HELD * T:
-        stopping = _Shown(least_time)
-        found, shown = _shorter(planner, shown, _Planner(limits, T, tolerance, start, stopping), stopping)
+    least = planner.least_stopping()
+    if least <= MOST_HELD * T:
+        stopping = _Planner(limits, T, tolerance, start, _Shown(least_time))
+        found, shown = _shorter(planner, stopping, least)
         yield from found
     else:
         yield from planner.run(final=True)
@@ -70,23 +71,22 @@ def plan(
         least_time.finish()
 
 
-def _shorter(
-    planner: _Planner, shown: _Shown, stopping: _Planner, shown_stopping: _Shown
-) -> tuple[list[SampleBlock], _Shown]:
-    """The motion of a short program, or where that takes less time the one that rests after each of its moves.
+def _shorter(planner: _Planner, stopping: _Planner, least: float) -> tuple[list[SampleBlock], _Shown]:
+    """The motion of a short program, or where that takes less time the one that rests after each of its moves, for
+    which `stopping` is there and which takes `least` s at the least; and what it shows of its path.
 
     Where to stop is decided corner by corner (path.py), by an estimate that does not know what is near the corner.
     """
-    least = planner.least_stopping()
     segments, events = np.concatenate([np.empty(0, SEGMENT), *planner.waiting]), list(planner.events)
     found = list(planner.run(final=True))
     if predicted_time(found) <= least:
-        return found, shown
+        return found, planner.shown
     segments["mode"] = EXACT_STOP
     stopping.take(segments, ())
     stopping.events = events
     stops = list(stopping.run(final=True))
-    return (stops, shown_stopping) if predicted_time(stops) < predicted_time(found) else (found, shown)
+    faster = predicted_time(stops) < predicted_time(found)
+    return (stops, stopping.shown) if faster else (found, planner.shown)
 
 
 class _Shown:
