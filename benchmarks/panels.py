@@ -37,8 +37,8 @@ _HOLD = """() => new Promise((done) => {
 })"""
 _RUNNING = "[...document.querySelectorAll('.rds-state')].some((each) => /Line 2 runs/.test(each.innerText))"
 _SCENE = "document.querySelector('.rds-scene').dataset"
-_RUNS = 100  # short simulations one after the other, to see whether anything grows
-_SETTLED = 20  # of them, before it is looked at first
+_RUNS = 160  # short simulations one after the other, to see whether anything grows in a hundred
+_SETTLED = 60  # of them, before it is looked at first: until then the browser still compiles what is called often
 _BARE = """import ipywidgets
 ipywidgets.IntSlider(description="bare")"""
 
@@ -50,7 +50,7 @@ def run() -> list[Figure]:
     from playwright.sync_api import sync_playwright
 
     opened, bare, first, answered, there, pictures, costs, in_motion = [], [], [], [], [], [], [], []
-    main_thread, beside, moving, alone, grown, held = [], [], [], [], [], []
+    main_thread, occupied, beside, moving, alone, grown, held = [], [], [], [], [], [], []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for attempt in range(-1, ROUNDS):  # the first start only brings the files into memory
@@ -75,10 +75,11 @@ def run() -> list[Figure]:
                     result, cost = _live(page, server, Path(folder))
                     costs.append(cost)
                     beside.append(_p99(result))
-                    result, passed, cost, busy = _animated(page, server, Path(folder))
+                    result, passed, cost, used, busy = _animated(page, server, Path(folder))
                     pictures.append(passed)
                     in_motion.append(cost)
-                    main_thread.append(busy)
+                    main_thread.append(used)
+                    occupied.append(busy)
                     moving.append(_p99(result))
                     if attempt == ROUNDS - 1:
                         grown = _growth(page, server, Path(folder))
@@ -97,6 +98,7 @@ def run() -> list[Figure]:
         Figure("kernel, live strip of a run at 10 Hz", "% of a core", tuple(costs), 3.0),
         Figure("kernel, with the machine in motion too", "% of a core", tuple(in_motion), 3.0),
         Figure("main thread of the browser, with the machine in motion too", "% of a core", tuple(main_thread), 30.0),
+        Figure("its tasks, with their waits for a core and for the pictures", "% of the time", tuple(occupied)),
         Figure(f"memory of the kernel that {_RUNS - _SETTLED} runs leave, after {_SETTLED}", "kB a run", grown[:1]),
         Figure(f"memory of the page that {_RUNS - _SETTLED} runs leave, after {_SETTLED}", "kB a run", grown[1:2]),
         Figure("of that, data: without the machine code that the browser makes of scripts", "kB a run", grown[2:], 1.0),
@@ -160,10 +162,12 @@ def _live(page: Any, server: int, folder: Path) -> tuple[Result, float]:
     return _saved(page, folder), cost
 
 
-def _animated(page: Any, server: int, folder: Path) -> tuple[Result, float, float, float]:
+def _animated(page: Any, server: int, folder: Path) -> tuple[Result, float, float, float, float]:
     """Another run of SECONDS with the machine in motion beside it.
 
     Its result, ms from a picture to the next, and shares of a core, %: the kernel's, and the main thread's of the page.
+    Last the share of the time in which a task of that thread had begun and not ended, %. Without a graphics card it
+    waits for the process that draws, and where all cores are in use it waits for one: time, and no use of a core.
     """
     page.click('button:visible:text-is("Run")')
     page.wait_for_selector(".rds-scene:visible", timeout=60_000)
@@ -172,20 +176,27 @@ def _animated(page: Any, server: int, folder: Path) -> tuple[Result, float, floa
     page.wait_for_function(f"{_SCENE}.state === 'live' && Number({_SCENE}.now) > 1", timeout=60_000)
     session = page.context.new_cdp_session(page)
     session.send("Performance.enable")
+    browser = page.context.browser.new_browser_cdp_session()
 
-    def state() -> tuple[float, float, float, dict[int, float]]:
+    def state() -> tuple[list[float], dict[int, float], dict[int, float]]:
         found = {each["name"]: each["value"] for each in session.send("Performance.getMetrics")["metrics"]}
-        drawn = float(page.evaluate(f"{_SCENE}.pictures"))
-        return time.perf_counter(), drawn, found["TaskDuration"], {each: _cpu(each) for each in _kernels(server)}
+        pictures = float(page.evaluate(f"{_SCENE}.pictures"))
+        kernels = {each: _cpu(each) for each in _kernels(server)}
+        processes = browser.send("SystemInfo.getProcessInfo")["processInfo"]
+        pages = [each["id"] for each in processes if each["type"] == "renderer"]
+        main_threads = {each: _cpu(f"{each}/task/{each}") for each in pages}
+        return [time.perf_counter(), pictures, found["TaskDuration"]], kernels, main_threads
 
-    before = state()
+    before, *processes_before = state()
     time.sleep(SECONDS * 0.5)
-    after = state()
-    passed = after[0] - before[0]
-    kernel = max(after[3].get(each, seconds) - seconds for each, seconds in before[3].items())
-    busy = (after[2] - before[2]) / passed * 100.0
-    per_picture = 1e3 * passed / max(after[1] - before[1], 1.0)
-    return _saved(page, folder), per_picture, kernel / passed * 100.0, busy
+    after, *processes_after = state()
+    passed, pictures, tasks = (there - here for here, there in zip(before, after, strict=True))
+    kernel, main_thread = (
+        max(there.get(each, seconds) - seconds for each, seconds in here.items())
+        for here, there in zip(processes_before, processes_after, strict=True)
+    )
+    shares = 100.0 * np.array([kernel, main_thread, tasks]) / passed
+    return _saved(page, folder), 1e3 * passed / max(pictures, 1.0), *map(float, shares)
 
 
 def _held(page: Any) -> list[float]:
@@ -318,7 +329,8 @@ def _kernels(server: int) -> list[int]:
     return [kernel for process in children.get(server, []) for kernel in children.get(process, [])]
 
 
-def _cpu(process: int) -> float:
+def _cpu(process: int | str) -> float:
+    """s of a core that a process has used, or a thread of it as `process/task/thread`."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS
 

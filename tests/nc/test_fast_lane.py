@@ -92,7 +92,7 @@ def test_it_takes_plain_lines(taken: Callable[[bytes], int]) -> None:
         *("G1 X1 X2", "G1 G0 X1", "X#1", "X[1+1]", "(msg, X) X1", "G4", "G4 P1 X1", "G17", "S-100", "T1", "M3 M4"),
         *("G90 G91", "(a", "(a(b)) X1", "(é)", "X(a)1", "(LOGCLOSE)", "(py, 1)", "M6", "M1.5", "G98 G99", "G80 X1"),
         *("G81 X1 Z-1", "G81 X1 R1", "G81 Z-1 R1 A5", "G82 Z-1 R1", "G83 Z-1 R1", "G81 Z-1 R1 L0", "G81 Z-1 R1 Q1"),
-        *("G84 Z-1 R1", "G81 Z2 R1", "G83 Z-9 R9 Q.0001", "G87 Z-1 R1 I1 J1 K1", "G81 Z-1 R1 I1", "M7 M8", "L1", "Q1"),
+        *("G84 Z-1 R1", "G81 Z2 R1", "G83 Z-9 R9 Q.003", "G87 Z-1 R1 I1 J1 K1", "G81 Z-1 R1 I1", "M7 M8", "L1", "Q1"),
         *("/X1", "X1 P2", "G2 X1 Y1 I9 J9", "G2 X1", "G2 X1 R.01", "G2 R1", "G1 I1 X1", "N1.5 X1", "X1 N2"),
         *(
             "X",

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from time import monotonic
 from typing import Any, Protocol
 
 import ipywidgets as widgets
 
 from rds.panels.kit.ticker import Ticker
+
+_SECONDS = 0.4  # between two showings: each costs the kernel and the page two messages
 
 
 class Work(Protocol):
@@ -59,6 +62,7 @@ class WorkBar(widgets.HBox):
         self._ticker = ticker
         self._work: Any = None
         self._stopped_in: str | None = None  # what it was doing when it was asked to end
+        self._shown_at, self._shown_note = 0.0, ""  # s, of the monotonic clock
         self._ended: Callable[[], None] | None = None
         self._end: Callable[[], None] | None = None
 
@@ -73,6 +77,7 @@ class WorkBar(widgets.HBox):
         self.layout.display = ""
         self.stop_button.disabled = False
         self._lock(True)
+        self._show(work)
         self._look()
         if self._work is not None:
             self._end = self._ticker.add(self._look)
@@ -88,13 +93,8 @@ class WorkBar(widgets.HBox):
         work = self._work
         if work is None:
             return
-        share, left = work.share, work.seconds_left
-        self._bar.value = share or 0.0
-        if self._stopped_in is not None:  # after it has stopped there may be files to write, which are no share of it
-            self._text.value = "stopping" if work.note == self._stopped_in else work.note
-        else:
-            parts = [work.note, "" if share is None else f"{share:.0%}", "" if left is None else f"{left:.0f} s left"]
-            self._text.value = ", ".join(filter(None, parts)) or "working"
+        if work.note != self._shown_note or monotonic() - self._shown_at >= _SECONDS:
+            self._show(work)
         if work.done:
             ended, self._work = self._ended, None
             self.layout.display = "none"
@@ -103,6 +103,16 @@ class WorkBar(widgets.HBox):
             self._lock(False)
             if ended is not None:
                 ended()
+
+    def _show(self, work: Work) -> None:
+        self._shown_at, self._shown_note = monotonic(), work.note
+        share, left = work.share, work.seconds_left
+        self._bar.value = share or 0.0
+        if self._stopped_in is not None:  # after it has stopped there may be files to write, which are no share of it
+            self._text.value = "stopping" if work.note == self._stopped_in else work.note
+        else:
+            parts = [work.note, "" if share is None else f"{share:.0%}", "" if left is None else f"{left:.0f} s left"]
+            self._text.value = ", ".join(filter(None, parts)) or "working"
 
     def _lock(self, on: bool) -> None:
         for button in self.locks:
