@@ -1,6 +1,7 @@
 """Compilation of kernels: by numba where it is installed (extra `fast`), else they run in Python as they are.
 
-Kept on disk by numba, so that only the first use after installing waits for the compiler (some 15 s).
+Kept on disk by numba, so that only the first use after installing waits for the compiler (some 40 s for the planner of
+motion). Short work does not wait for it: the planner's kernels run in Python until they have taken some seconds.
 """
 
 from __future__ import annotations
@@ -8,16 +9,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from time import perf_counter
 from typing import Any, TypeVar, cast
+
+import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 try:
-    from numba import njit
+    from numba import config, njit
 except ImportError:  # the extra is not installed
     COMPILED = False
 else:
-    COMPILED = True
+    COMPILED = not config.DISABLE_JIT  # which a user sets to look into a kernel
+
+LONG = 10.0  # s that tiered kernels run in Python before they are compiled
+LOADED = 0.3  # s, the same where compiled ones are kept on disk: loading takes about as long
 
 _CHANGED: dict[Path, float] = {}  # folders of kernels, and when a file there was last changed
 
@@ -30,6 +37,46 @@ def kernel(function: F) -> F:
 def long_kernel(function: F) -> F:
     """The same of a kernel that goes on for long: other threads of the program go on meanwhile."""
     return _compiled(function, nogil=True) if COMPILED else function
+
+
+def tiered_kernel(function: F) -> F:
+    """The same, in Python until this process has spent LONG in such kernels: a short program never waits for the
+    compiler. Both give the same samples, so that it makes no difference when that is.
+    """
+    return cast(F, TieredKernel(function, _compiled(function))) if COMPILED else function
+
+
+class TieredKernel:
+    """Callable from Python in either way, and from compiled kernels as the compiled one."""
+
+    __slots__ = ("compiled", "plain")
+    spent = 0.0  # s, of all of them in Python
+    enough = LONG
+    is_within = False  # another kernel that runs in Python
+
+    def __init__(self, plain: Callable[..., Any], compiled: Any) -> None:
+        self.plain, self.compiled = plain, compiled
+        if any(Path(compiled.stats.cache_path).glob("*.nbi")):
+            TieredKernel.enough = LOADED
+
+    def __call__(self, *values: Any, **named: Any) -> Any:
+        of = TieredKernel
+        if of.is_within:
+            return self.plain(*values, **named)
+        if of.spent >= of.enough:
+            return self.compiled(*values, **named)
+        began, of.is_within = perf_counter(), True
+        try:
+            with np.errstate(all="ignore"):  # compiled ones say nothing either
+                return self.plain(*values, **named)
+        finally:
+            of.is_within = False
+            of.spent += perf_counter() - began
+
+    @property
+    def _numba_type_(self) -> Any:
+        """Numba asks for this where a compiled kernel calls this one."""
+        return self.compiled._numba_type_
 
 
 def _compiled(function: F, **options: Any) -> F:

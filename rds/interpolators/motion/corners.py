@@ -16,7 +16,7 @@ from math import fabs, inf, sqrt
 
 import numpy as np
 
-from rds.core.compiling import kernel
+from rds.core.compiling import tiered_kernel
 from rds.interpolators.motion.pieces import BLENDED, FEED, KIND, LENGTH, SHAPE, SLOPE_0, SLOPE_1, STRAIGHT
 from rds.interpolators.motion.sampling import JERK, LASTS, PLACE, RATE, SINCE, SPEED, averaged
 
@@ -34,7 +34,7 @@ STEP, JERKS, AT_END, PUSH_END, HALF, FASTEST, PUSH, LINE_JERK, TOP, RAMP, LASTIN
 COLUMNS = 14
 
 
-@kernel
+@tiered_kernel
 def _keeps(axes, v0, row, looks, share):
     """Whether half a blend keeps all limits with the jerks in `row`; sets the length of its steps, and its end.
 
@@ -87,7 +87,7 @@ def _keeps(axes, v0, row, looks, share):
     return True
 
 
-@kernel
+@tiered_kernel
 def _ramp(row, top):
     """Duration and length of the ramp from the end of half a blend to `top`, where the acceleration is 0."""
     j, v, a = row[LINE_JERK], row[AT_END], row[PUSH_END]
@@ -102,7 +102,7 @@ def _ramp(row, top):
     return up + even + down, way
 
 
-@kernel
+@tiered_kernel
 def _set_top(row, top):
     row[TOP] = top
     row[LASTING], row[RAMP] = _ramp(row, top)
@@ -110,7 +110,7 @@ def _set_top(row, top):
     row[RAMP] += row[HALF]
 
 
-@kernel
+@tiered_kernel
 def _raise_jerks(axes, v0, row, passes, first, by):
     """Raise the jerks of the steps, from `first` on, as far as the limits allow; whether any were found."""
     for share in passes:
@@ -134,7 +134,7 @@ def _raise_jerks(axes, v0, row, passes, first, by):
     return False
 
 
-@kernel
+@tiered_kernel
 def _pass_half(axes, v0, h, fastest, top, row):
     """The steps of half a blend from its middle, passed at v0, and the ramp to `top`; whether there are any.
 
@@ -158,7 +158,7 @@ def _pass_half(axes, v0, h, fastest, top, row):
     return found
 
 
-@kernel
+@tiered_kernel
 def flats(rows, tau, begin, end):
     """Where the averaged profile is even: rows of (time and place of its start, time and place of its end, speed)."""
     found = np.empty((len(rows), 5))
@@ -182,7 +182,7 @@ def flats(rows, tau, begin, end):
     return found[:count]
 
 
-@kernel
+@tiered_kernel
 def seam(rows, tau, begin, end):
     """The last time until `end` at which the averaged profile is at a top; `end` where it is at none."""
     even = flats(rows, tau, begin, end)
@@ -192,7 +192,7 @@ def seam(rows, tau, begin, end):
     return end
 
 
-@kernel
+@tiered_kernel
 def _corner_at(place, f, u, at):
     """The first of the two halves of a blend between lines within which a place is, or −1."""
     k = np.searchsorted(at, place, side="right") - 1
@@ -208,7 +208,7 @@ def _corner_at(place, f, u, at):
     return k
 
 
-@kernel
+@tiered_kernel
 def _pass_corner(k, f, left, right, velocity, acceleration, jerk, one, other):
     """Both halves of the corner at the end of piece k, away from its middle, and the speed there; 0 if it is none."""
     axes, n = np.empty((6, 5)), 0
@@ -234,7 +234,7 @@ def _pass_corner(k, f, left, right, velocity, acceleration, jerk, one, other):
     return v0 if _pass_half(axes, v0, h, fastest, left, one) else 0.0
 
 
-@kernel
+@tiered_kernel
 def _highest(one, other, way, most):
     """The highest top, at most `most`, on the line between two corners, with halves `one` and `other`, `way` apart."""
     low, high = max(one[TOP], other[TOP]), most
@@ -249,7 +249,7 @@ def _highest(one, other, way, most):
     return low
 
 
-@kernel
+@tiered_kernel
 def _emit(out, count, since, lasts, place, speed, push, jerk):
     """One phase; the number of phases, and time, place, speed and acceleration at its end."""
     if lasts > 0.0:
@@ -260,7 +260,7 @@ def _emit(out, count, since, lasts, place, speed, push, jerk):
     return count, since + lasts, place, speed + lasts * (push + 0.5 * lasts * jerk), push + lasts * jerk
 
 
-@kernel
+@tiered_kernel
 def _half(row, outwards, out, count, since, place, speed):
     """The phases of half a corner: from its middle to its top, or from there to the middle."""
     j, v, a = row[LINE_JERK], row[AT_END], row[PUSH_END]
@@ -283,7 +283,7 @@ def _half(row, outwards, out, count, since, place, speed):
     return count, since
 
 
-@kernel
+@tiered_kernel
 def motion(rows, tau, begin, end, since, f, u, at, velocity, acceleration, jerk):
     """The motion from the time `begin` to `end` of the averaged profile, as phases of constant jerk from `since` on.
 

@@ -14,7 +14,7 @@ from math import fabs, inf, pi, sqrt
 
 import numpy as np
 
-from rds.core.compiling import kernel
+from rds.core.compiling import tiered_kernel
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.pieces import (
     AXIS_1,
@@ -30,6 +30,7 @@ from rds.interpolators.motion.pieces import (
     SLOPE_1,
     evaluate,
     no_pieces,
+    square,
 )
 
 OF_BLEND = 12  # intervals
@@ -43,7 +44,7 @@ WAY, MOST, HIGHEST, FROM, TO = 0, 1, 2, 3, 15
 COLUMNS = 27
 
 
-@kernel
+@tiered_kernel
 def intervals(f, u, velocity, acceleration, T):
     """The intervals of pieces (floats f, whole numbers u) as rows, and the number of rows of each piece."""
     n = len(f)
@@ -58,7 +59,7 @@ def intervals(f, u, velocity, acceleration, T):
             steps[k] = OF_ARC / fabs(f[k, SHAPE + 14])
             for i in range(6):
                 if acceleration[i] > 0.0:
-                    firsts[k] = min(firsts[k], OF_RAMP * min(f[k, FEED], velocity[i]) ** 2 / acceleration[i])
+                    firsts[k] = min(firsts[k], OF_RAMP * square(min(f[k, FEED], velocity[i])) / acceleration[i])
             way, step, half = 0.0, firsts[k], 0
             while way < 0.5 * f[k, LENGTH]:
                 way += step
@@ -102,7 +103,7 @@ def intervals(f, u, velocity, acceleration, T):
     return rows, counts
 
 
-@kernel
+@tiered_kernel
 def _range(row, acceleration, x, most):
     """Lowest and highest u at x on an interval that ends with x ≤ most, and how fast both change with x."""
     double = 2.0 * row[WAY]
@@ -124,7 +125,7 @@ def _range(row, acceleration, x, most):
     return low, low_slope, high, high_slope
 
 
-@kernel
+@tiered_kernel
 def _backward(rows, acceleration, end):
     """The highest x at each edge from which the rest of the intervals can be passed, with at most `end` there."""
     n = len(rows)
@@ -143,7 +144,7 @@ def _backward(rows, acceleration, end):
     return top
 
 
-@kernel
+@tiered_kernel
 def _forward(rows, acceleration, top, x, upto):
     """x at edge `upto` and the seconds until there, as fast as may be below `top`."""
     seconds = 0.0

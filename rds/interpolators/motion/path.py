@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.compiling import kernel
+from rds.core.compiling import tiered_kernel
 from rds.interpolators.motion.pieces import (
     AXIS_1,
     AXIS_2,
@@ -44,6 +44,7 @@ from rds.interpolators.motion.pieces import (
     make_straight,
     make_turn,
     quickening,
+    square,
     trim,
 )
 
@@ -57,20 +58,25 @@ LOST = 0.65  # at most, at turns of 40° to 145° on machines whose acceleration
 EXACT_STOP, BLEND, LINE = 1, 2, -1  # as in segments.py
 
 
-@kernel
+@tiered_kernel
+def _size(x, y, z):
+    return sqrt(x * x + y * y + z * z)
+
+
+@tiered_kernel
 def gap(a, b):
     """Distance of two positions: the larger of that in X, Y, Z (mm) and that in A, B, C (degrees)."""
-    linear = sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
-    rotary = sqrt((a[3] - b[3]) ** 2 + (a[4] - b[4]) ** 2 + (a[5] - b[5]) ** 2)
+    linear = _size(a[0] - b[0], a[1] - b[1], a[2] - b[2])
+    rotary = _size(a[3] - b[3], a[4] - b[4], a[5] - b[5])
     return max(linear, rotary)
 
 
-@kernel
+@tiered_kernel
 def _off_line(begin, ends, first, last, nearest):
     """How far the ends first to last−1 are from the line from `begin` to ends[last]; inf if not in order along it."""
     total = 0.0
     for i in range(6):
-        total += (ends[last, i] - begin[i]) ** 2
+        total += square(ends[last, i] - begin[i])
     if total == 0.0:
         return inf
     before, off = 0.0, 0.0
@@ -88,7 +94,7 @@ def _off_line(begin, ends, first, last, nearest):
     return off
 
 
-@kernel
+@tiered_kernel
 def _away(b, f, u, q, p, dp, ddp):
     """Distance of b to the piece f near its parameter q: Newton's steps to the nearest point."""
     for _ in range(3):
@@ -102,7 +108,7 @@ def _away(b, f, u, q, p, dp, ddp):
     return gap(b, p)
 
 
-@kernel
+@tiered_kernel
 def _blend_half(f, u, g, w, tolerance, work):
     """Half the length in q of the blend from piece f to piece g (untrimmed); 0 where none fits.
 
@@ -114,8 +120,8 @@ def _blend_half(f, u, g, w, tolerance, work):
     evaluate(g, w[KIND], w[AXIS_1], w[AXIS_2], 0.0, p1, d1, dd1)
     turn = bend = product = 0.0
     for i in range(6):
-        turn += (d1[i] - d0[i]) ** 2
-        bend += (dd1[i] - dd0[i]) ** 2
+        turn += square(d1[i] - d0[i])
+        bend += square(dd1[i] - dd0[i])
         product += d0[i] * d1[i]
     turn, bend = sqrt(turn), sqrt(bend)
     half = 0.5 * min(f[LENGTH], g[LENGTH])
@@ -148,7 +154,7 @@ def _blend_half(f, u, g, w, tolerance, work):
     return 0.0
 
 
-@kernel
+@tiered_kernel
 def _turn_speed(f, g, jerk, T):
     """dq/dt at which the change of direction from f to g takes TURN_SHARE of the jerk of a sample's differences."""
     speed = inf
@@ -159,7 +165,7 @@ def _turn_speed(f, g, jerk, T):
     return speed
 
 
-@kernel
+@tiered_kernel
 def _stopping_is_faster(b, f, g, d0, d1, acceleration, jerk, tau, work):
     """Whether a rest at the corner of pieces f and g takes less time than the blend b, as far as both can be told here.
 
@@ -183,11 +189,11 @@ def _stopping_is_faster(b, f, g, d0, d1, acceleration, jerk, tau, work):
         return False
     ramp = min(tau, sqrt(v / j))
     length = 2.0 * b[LENGTH]  # of both halves
-    passing = (v - c) ** 2 / (v * a) + (ramp + LOST * length / c) * (1.0 - c / v)
+    passing = square(v - c) / (v * a) + (ramp + LOST * length / c) * (1.0 - c / v)
     return UNSURE * passing > v / a + ramp
 
 
-@kernel
+@tiered_kernel
 def _emit(out, ints, count, f, u, first, last, rest, distance, work):
     p, dp, ddp = work[8, :6], work[9, :6], work[10, :6]
     out[count, :] = f[:FLOATS]
@@ -198,7 +204,7 @@ def _emit(out, ints, count, f, u, first, last, rest, distance, work):
     return count + 1
 
 
-@kernel
+@tiered_kernel
 def _close(out, ints, count, f, u, first, last, front, distance, work):
     """Emit a piece, less what a blend took of its start, that ends at rest."""
     taken = distance + front * f[RATIO]
@@ -206,7 +212,7 @@ def _close(out, ints, count, f, u, first, last, front, distance, work):
     return _emit(out, ints, count, f, u, first, last, np.int64(1), taken, work)
 
 
-@kernel
+@tiered_kernel
 def build(
     start,
     end,
@@ -306,8 +312,8 @@ def build(
                 cosine, size_0, size_1 = 0.0, 0.0, 0.0
                 for k in range(6):
                     cosine += d0[k] * d1[k]
-                    size_0 += d0[k] ** 2
-                    size_1 += d1[k] ** 2
+                    size_0 += square(d0[k])
+                    size_1 += square(d1[k])
                 stops = cosine < SHARP * sqrt(size_0 * size_1)
                 left = min(held_room, room)
                 if not stops and left > 0.0:

@@ -11,7 +11,7 @@ from math import cos, fabs, sin, sqrt
 
 import numpy as np
 
-from rds.core.compiling import kernel
+from rds.core.compiling import tiered_kernel
 
 # Columns of the floats. Vectors over the six axes take six columns.
 LENGTH = 0  # of q
@@ -33,7 +33,13 @@ STRAIGHT, CIRCULAR, BLENDED = 0, 1, 2
 BENDING = 0.7  # what SHARE is to begin with
 
 
-@kernel
+@tiered_kernel
+def square(x):
+    """x², rounded once in either way; x ** 2 is not always, in Python."""
+    return x * x
+
+
+@tiered_kernel
 def evaluate(f, kind, axis_1, axis_2, q, p, dp, ddp):
     """Position and its first two derivatives by q, into p, dp, ddp.
 
@@ -65,12 +71,12 @@ def evaluate(f, kind, axis_1, axis_2, q, p, dp, ddp):
         ddp[axis_2] += turn * turn * (-s * x - c * y)
 
 
-@kernel
+@tiered_kernel
 def make_straight(f, start, end, programmed):
     """A line from `start` to `end` into the row f. `programmed` is its programmed length (mm or degrees)."""
     total = 0.0
     for i in range(6):
-        total += (end[i] - start[i]) ** 2
+        total += square(end[i] - start[i])
     total = sqrt(total)
     f[LENGTH] = total
     f[RATIO] = programmed / total if total > 0.0 else 1.0
@@ -80,7 +86,7 @@ def make_straight(f, start, end, programmed):
         f[END + i] = end[i]
 
 
-@kernel
+@tiered_kernel
 def make_circular(f, start, end, centre, sweep, axis_1, axis_2, programmed):
     """An arc or helix into the row f. An end that is a little off the circle is met by a drift along the whole arc.
 
@@ -94,7 +100,7 @@ def make_circular(f, start, end, centre, sweep, axis_1, axis_2, programmed):
     total = (x * x + y * y) * sweep * sweep
     for i in range(6):
         if i != axis_1 and i != axis_2:
-            total += (end[i] - start[i]) ** 2
+            total += square(end[i] - start[i])
     total = sqrt(total)
     f[LENGTH] = total
     f[RATIO] = programmed / total
@@ -104,10 +110,10 @@ def make_circular(f, start, end, centre, sweep, axis_1, axis_2, programmed):
         f[END + i] = end[i]
     f[SHAPE + 6 + axis_1], f[SHAPE + 6 + axis_2] = off_1 / total, off_2 / total
     f[SHAPE + 12], f[SHAPE + 13], f[SHAPE + 14] = x, y, sweep / total
-    return sqrt(off_1**2 + off_2**2)
+    return sqrt(off_1 * off_1 + off_2 * off_2)
 
 
-@kernel
+@tiered_kernel
 def trim(f, kind, axis_1, axis_2, front, back, p, dp, ddp):
     """Shorten a line or an arc by `front` at its start and by `back` at its end."""
     if front > 0.0:
@@ -126,10 +132,11 @@ def trim(f, kind, axis_1, axis_2, front, back, p, dp, ddp):
             f[END + i] = p[i]
 
 
-@kernel
+@tiered_kernel
 def make_blend(f, half, p0, d0, dd0, p1, d1, dd1):
     """The quintic that leaves p0 and arrives at p1 with their derivatives, over q from 0 to 2·half, into the row f."""
     h = 2.0 * half
+    h2 = h * h
     f[LENGTH] = h
     for i in range(6):
         way = p1[i] - p0[i] - h * d0[i] - 0.5 * h * h * dd0[i]
@@ -137,13 +144,13 @@ def make_blend(f, half, p0, d0, dd0, p1, d1, dd1):
         curl = h * h * (dd1[i] - dd0[i])
         c = SHAPE + i
         f[c], f[c + 6], f[c + 12] = p0[i], d0[i], 0.5 * dd0[i]
-        f[c + 18] = (10.0 * way - 4.0 * tilt + 0.5 * curl) / h**3
-        f[c + 24] = (-15.0 * way + 7.0 * tilt - curl) / h**4
-        f[c + 30] = (6.0 * way - 3.0 * tilt + 0.5 * curl) / h**5
+        f[c + 18] = (10.0 * way - 4.0 * tilt + 0.5 * curl) / (h * h2)
+        f[c + 24] = (-15.0 * way + 7.0 * tilt - curl) / (h2 * h2)
+        f[c + 30] = (6.0 * way - 3.0 * tilt + 0.5 * curl) / (h * (h2 * h2))
         f[END + i] = p1[i]
 
 
-@kernel
+@tiered_kernel
 def make_turn(first, second, half, corner, d0, d1):
     """From the direction d0 to d1 (unit vectors) about a corner of two lines, into two rows, each `half` long.
 
@@ -162,7 +169,7 @@ def make_turn(first, second, half, corner, d0, d1):
         first[END + i], second[END + i] = second[c], corner[i] + half * d1[i]
 
 
-@kernel
+@tiered_kernel
 def bound(f, kind, axis_1, axis_2, p, dp, ddp):
     """Fill in the bounds of the derivatives of the row f, and the derivatives at its ends."""
     length = f[LENGTH]
@@ -182,14 +189,14 @@ def bound(f, kind, axis_1, axis_2, p, dp, ddp):
         f[TWIST + i] = 0.0
     if kind == CIRCULAR:
         turn = fabs(f[SHAPE + 14])
-        radius = sqrt(f[SHAPE + 12] ** 2 + f[SHAPE + 13] ** 2)
+        radius = sqrt(square(f[SHAPE + 12]) + square(f[SHAPE + 13]))
         for i in (axis_1, axis_2):
             f[SLOPE + i] += radius * turn
-            f[BEND + i] = radius * turn**2
-            f[TWIST + i] = radius * turn**3
+            f[BEND + i] = radius * (turn * turn)
+            f[TWIST + i] = radius * (turn * (turn * turn))
 
 
-@kernel
+@tiered_kernel
 def _bound_polynomial(f, i, h):
     c = SHAPE + i
     c1, c2, c3, c4, c5 = f[c + 6], f[c + 12], f[c + 18], f[c + 24], f[c + 30]
@@ -215,25 +222,26 @@ def _bound_polynomial(f, i, h):
     f[BEND + i] = bend
     # dp/dq: the hull of its Bézier points (degree 4)
     slope = max(fabs(c1), fabs(c1 + h * (2 * c2 + h * (3 * c3 + h * (4 * c4 + h * 5 * c5)))))
-    a1, a2, a3 = 2 * c2 * h, 3 * c3 * h**2, 4 * c4 * h**3
+    a1, a2, a3 = 2 * c2 * h, 3 * c3 * (h * h), 4 * c4 * (h * (h * h))
     slope = max(slope, fabs(c1 + a1 / 4), fabs(c1 + a1 / 2 + a2 / 6), fabs(c1 + 3 * a1 / 4 + a2 / 2 + a3 / 4))
     f[SLOPE + i] = slope
 
 
-@kernel
+@tiered_kernel
 def quickening(f):
     """How many times faster than at its ends a blend is passed at most, at a steady dq/dt; 1 or more.
 
     For X, Y, Z and for A, B, C, by the hull of the Bézier points of dp/dq, which are taken of its two halves.
     """
     h, worst = f[LENGTH], 1.0
+    h2 = h * h
     left, right, row = np.empty((3, 5)), np.empty((3, 5)), np.empty(5)
     for first in (0, 3):
         ends = most = 0.0
         for i in range(3):
             c = SHAPE + first + i
-            a0, a1, a2 = f[c + 6], 2.0 * f[c + 12] * h, 3.0 * f[c + 18] * h**2
-            a3, a4 = 4.0 * f[c + 24] * h**3, 5.0 * f[c + 30] * h**4
+            a0, a1, a2 = f[c + 6], 2.0 * f[c + 12] * h, 3.0 * f[c + 18] * h2
+            a3, a4 = 4.0 * f[c + 24] * (h * h2), 5.0 * f[c + 30] * (h2 * h2)
             row[0], row[1], row[2] = a0, a0 + a1 / 4.0, a0 + a1 / 2.0 + a2 / 6.0
             row[3], row[4] = a0 + 0.75 * a1 + a2 / 2.0 + a3 / 4.0, a0 + a1 + a2 + a3 + a4
             for k in range(5):  # de Casteljau
@@ -241,8 +249,8 @@ def quickening(f):
                 for m in range(4 - k):
                     row[m] = 0.5 * (row[m] + row[m + 1])
         for k in range(5):
-            one = left[0, k] ** 2 + left[1, k] ** 2 + left[2, k] ** 2
-            other = right[0, k] ** 2 + right[1, k] ** 2 + right[2, k] ** 2
+            one = square(left[0, k]) + square(left[1, k]) + square(left[2, k])
+            other = square(right[0, k]) + square(right[1, k]) + square(right[2, k])
             most = max(most, one, other)
             if k == 0:
                 ends = one

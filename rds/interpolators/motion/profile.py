@@ -9,26 +9,27 @@ from math import fabs, sqrt
 
 import numpy as np
 
-from rds.core.compiling import kernel
+from rds.core.compiling import tiered_kernel
+from rds.interpolators.motion.pieces import square
 
 ALL = 1.0 - 1e-6  # of a length: a ramp that takes so much of it takes all of it
 
 
-@kernel
+@tiered_kernel
 def speeds(edges, cap, push, first, last):
     """Highest speeds at the edges, from `first` on, at most `last` at the end; `cap`, `push`: limits between edges."""
     n = len(cap)
     v = np.empty(n + 1)
     v[0] = first
     for e in range(n):
-        reached = sqrt(v[e] ** 2 + 2.0 * push[e] * (edges[e + 1] - edges[e]))
+        reached = sqrt(v[e] * v[e] + 2.0 * push[e] * (edges[e + 1] - edges[e]))
         v[e + 1] = min(cap[e], last, reached) if e == n - 1 else min(cap[e], cap[e + 1], reached)
     for e in range(n - 1, 0, -1):
-        v[e] = min(v[e], sqrt(v[e + 1] ** 2 + 2.0 * push[e] * (edges[e + 1] - edges[e])))
+        v[e] = min(v[e], sqrt(v[e + 1] * v[e + 1] + 2.0 * push[e] * (edges[e + 1] - edges[e])))
     return v
 
 
-@kernel
+@tiered_kernel
 def settled(edges, cap, push, first, v):
     """The last edge up to which the speeds v, that end at rest, are what they would be if they did not."""
     free = speeds(edges, cap, push, first, np.inf)
@@ -38,7 +39,7 @@ def settled(edges, cap, push, first, v):
     return edges[e]
 
 
-@kernel
+@tiered_kernel
 def phases_of(edges, cap, push, v):
     """Phases through the speeds v at the edges, as fast as may be between them."""
     n = len(cap)
@@ -70,7 +71,7 @@ def phases_of(edges, cap, push, v):
     return phases[:count]
 
 
-@kernel
+@tiered_kernel
 def hold_tops(phases, tau):
     """The phases with each top of the speed held for τ at least, by lowering it.
 
@@ -94,11 +95,11 @@ def hold_tops(phases, tau):
         length = 0.0
         while True:
             flat = 1e-12 * level * level  # a phase that changes the speed by rounding only has no slope to go down
-            if count > 0 and fabs(out[count - 1, 2] ** 2 - out[count - 1, 1] ** 2) <= flat:
+            if count > 0 and fabs(square(out[count - 1, 2]) - square(out[count - 1, 1])) <= flat:
                 count -= 1
                 length += out[count, 0]
                 continue
-            if right < k and (phases[right, 2] >= level or phases[right, 1] ** 2 - phases[right, 2] ** 2 <= flat):
+            if right < k and (phases[right, 2] >= level or square(phases[right, 1]) - square(phases[right, 2]) <= flat):
                 length += phases[right, 0]
                 right += 1
                 continue
@@ -106,8 +107,8 @@ def hold_tops(phases, tau):
             if length >= level * tau or last < 0 or right >= k or out[last, 2] < out[last, 1]:
                 break
             u, w = out[last, 1], phases[right, 2]
-            gain_left = out[last, 0] / (out[last, 2] ** 2 - u * u)
-            gain_right = phases[right, 0] / (phases[right, 1] ** 2 - w * w)
+            gain_left = out[last, 0] / (square(out[last, 2]) - u * u)
+            gain_right = phases[right, 0] / (square(phases[right, 1]) - w * w)
             gain = gain_left + gain_right
             lower = (sqrt(tau * tau + 4.0 * gain * (length + gain * level * level)) - tau) / (2.0 * gain)
             below = max(lower, u, w)
@@ -137,7 +138,7 @@ def hold_tops(phases, tau):
     return out[:count]
 
 
-@kernel
+@tiered_kernel
 def cut(phases, length):
     """The phases up to `length` from their start."""
     for i in range(len(phases)):

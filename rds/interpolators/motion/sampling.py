@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rds.core.compiling import kernel
+from rds.core.compiling import tiered_kernel
 from rds.interpolators.motion.pieces import AXIS_1, AXIS_2, DISTANCE, KIND, LENGTH, RATIO, SHAPE, STRAIGHT, evaluate
 
 # Columns of a timed phase: start time, duration, place and speed at its start, acceleration; and of constant jerk.
@@ -12,7 +12,7 @@ SINCE, LASTS, PLACE, SPEED, RATE, JERK = range(6)
 _SHORTEST = 1e-12  # s, of a phase: what is shorter is rounding
 
 
-@kernel
+@tiered_kernel
 def timed(phases, time, place):
     """Phases (length, speed at start and end) with their times, from `time` and `place` on."""
     rows = np.empty((len(phases), 5))
@@ -26,7 +26,7 @@ def timed(phases, time, place):
     return rows
 
 
-@kernel
+@tiered_kernel
 def _at(rows, i, time):
     """Place and speed at a time of phase i, which before the first phase and after the last stand still."""
     since = min(max(time - rows[i, SINCE], 0.0), rows[i, LASTS])
@@ -34,7 +34,7 @@ def _at(rows, i, time):
     return rows[i, PLACE] + (rows[i, SPEED] + 0.5 * rows[i, RATE] * since) * since, speed
 
 
-@kernel
+@tiered_kernel
 def averaged(rows, tau, begin, end, since, out, count):
     """The mean of timed phases over the τ before each time from `begin` to `end`, in phases of constant jerk.
 
@@ -90,7 +90,7 @@ def averaged(rows, tau, begin, end, since, out, count):
     return count, since
 
 
-@kernel
+@tiered_kernel
 def sample(phases, T, first, count, f, u, at, position, velocity, acceleration, distance, piece):
     """Fill samples `first` to first + count − 1, sample k being at the time kT of the phases, which cover these times.
 

@@ -16,7 +16,7 @@ from math import fabs, inf, sqrt
 
 import numpy as np
 
-from rds.core.compiling import kernel
+from rds.core.compiling import tiered_kernel
 from rds.interpolators.motion.path import TURN_SHARE
 from rds.interpolators.motion.pieces import (
     BEND,
@@ -36,7 +36,7 @@ from rds.interpolators.motion.pieces import (
 BEND_SHARE = 0.3  # of the jerk, for jumps of the curvature at joints
 
 
-@kernel
+@tiered_kernel
 def piece_limits(f, velocity, acceleration, jerk, tau):
     """Fill CAP and PUSH of the rows f: highest dq/dt and d²q/dt².
 
@@ -58,11 +58,11 @@ def piece_limits(f, velocity, acceleration, jerk, tau):
             if slope > 0.0:
                 a = min(a, (acceleration[i] - c * c * bend) / slope)
             if slope > 0.0 or bend > 0.0:
-                a = min(a, (jerk[i] - c**3 * twist) / (3.0 * c * bend + slope / tau))
+                a = min(a, (jerk[i] - c * (c * c) * twist) / (3.0 * c * bend + slope / tau))
         f[k, CAP], f[k, PUSH] = c, a
 
 
-@kernel
+@tiered_kernel
 def joint_limits(f, at, acceleration, jerk, tau, T):
     """Highest speed, acceleration and reach (to either side) of the joints where something jumps: rows of
     (place, speed, acceleration, reach). `at` holds the place of each piece's start."""
@@ -87,7 +87,7 @@ def joint_limits(f, at, acceleration, jerk, tau, T):
         for i in range(6):
             turn = fabs(f[j + 1, SLOPE_0 + i] - f[j, SLOPE_1 + i])
             bend = fabs(f[j + 1, BEND_0 + i] - f[j, BEND_1 + i])
-            some = some or turn * guess > 1e-5 * jerk[i] * T * T or bend * guess**2 > 1e-5 * jerk[i] * T
+            some = some or turn * guess > 1e-5 * jerk[i] * T * T or bend * (guess * guess) > 1e-5 * jerk[i] * T
         if not some:
             continue
         place = at[j + 1]
@@ -125,7 +125,7 @@ def joint_limits(f, at, acceleration, jerk, tau, T):
                 bend = max(bend, f[k, BEND + i])
                 twist = max(twist, f[k, TWIST + i])
             if slope > 0.0:
-                left = jerk[i] - c * turns / T**2 - 0.75 * c * c * bends / T - c**3 * twist
+                left = jerk[i] - c * turns / (T * T) - 0.75 * c * c * bends / T - c * (c * c) * twist
                 a = min(a, left / (3.0 * c * bend + slope / tau + 0.75 * turns / T))
                 a = min(a, (acceleration[i] - c * turns / T - c * c * bend) / slope)
         found[count, 0], found[count, 1], found[count, 2], found[count, 3] = place, c, a, 1.5 * T * c
@@ -133,7 +133,7 @@ def joint_limits(f, at, acceleration, jerk, tau, T):
     return found[:count]
 
 
-@kernel
+@tiered_kernel
 def _lowest(low, high, values, edges):
     """The lowest of `values` whose range [low, high] covers each interval between two edges."""
     lowest = np.empty(len(edges) - 1)
@@ -155,7 +155,7 @@ def _lowest(low, high, values, edges):
     return lowest
 
 
-@kernel
+@tiered_kernel
 def envelope(f, at, joints, tau, start, end):
     """Edges from `start` to `end`, highest speed and acceleration between them; each limit reaches c·τ/2 further."""
     n, m = len(f), len(joints)

@@ -16,7 +16,7 @@ from math import ceil, sqrt
 
 import numpy as np
 
-from rds.core.compiling import kernel
+from rds.core.compiling import tiered_kernel
 from rds.interpolators.motion.corners import motion, seam
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.pieces import CAP, END, FIRST, LAST, LENGTH, REST, SHARE, no_pieces
@@ -261,7 +261,7 @@ class Stretch:
             self._place -= at[gone]
 
 
-@kernel
+@tiered_kernel
 def _lasting(phases):
     """s."""
     total = 0.0
