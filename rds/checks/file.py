@@ -140,11 +140,13 @@ def _error(data: Any) -> InputError:
 def _place(trace: Path, file: Path) -> str:
     """The innermost line of the student's file in the stack that was dumped: "file.py, line 3, in control: `...`"."""
     try:
-        text = trace.read_text(errors="replace")
+        stack = re.findall(r'File "(.+)", line (\d+) in (\S+)', trace.read_text(errors="replace"))
+        if not stack or not file.is_file():  # a pipe or a device, which the worker has refused, may have no end
+            return ""
         source = file.resolve().read_text(errors="replace").splitlines()
     except (OSError, RuntimeError):  # RuntimeError: how Path.resolve tells of a loop of links before Python 3.13
         return ""
-    for name, number, function in re.findall(r'File "(.+)", line (\d+) in (\S+)', text):
+    for name, number, function in stack:
         if Path(name) == file.resolve() and 0 < int(number) <= len(source):
             return f"{file.name}, line {number}, in {function}: `{source[int(number) - 1].strip()}`"
     return ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 
@@ -189,6 +190,13 @@ def test_a_link_that_leads_to_itself_raises(tmp_path):
     loop.symlink_to(loop)
     with pytest.raises(InputError, match=r"loop\.py"):
         check_file(loop)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_pipe_is_refused_without_waiting_for_its_other_end(tmp_path):
+    os.mkfifo(tmp_path / "law.py")
+    with pytest.raises(InputError, match="it is not a regular file"):
+        check_file(tmp_path / "law.py")
 
 
 def test_a_wrong_signature_is_a_fault(write):
