@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,10 +19,17 @@ def print_canon(items: Iterable[MotionBlock | Call | Batch]) -> None:
     """Print the calls as LinuxCNC's `rs274 -g` does, as they come."""
     from rds.nc.language.canon_text import written
 
-    try:
+    with until_nobody_reads():
         sys.stdout.writelines(written(items))
         sys.stdout.flush()
-    except BrokenPipeError:  # `| head` has seen enough
+
+
+@contextmanager
+def until_nobody_reads() -> Iterator[None]:
+    """For printing that ends without a word where the reader has: `| head` has seen enough."""
+    try:
+        yield
+    except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

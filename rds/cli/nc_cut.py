@@ -154,7 +154,6 @@ def _along(folder: Path, carving: Carving, blocks: list[PathBlock], machine: Mac
     import numpy as np
 
     from rds.core.errors import InputError
-    from rds.nc.run.of_samples import of_samples
     from rds.results import open_result
 
     result = open_result(folder)
@@ -167,12 +166,29 @@ def _along(folder: Path, carving: Carving, blocks: list[PathBlock], machine: Mac
     points = np.column_stack(
         [result[f"{name}_measured"] if name not in missing else np.zeros(len(result)) for name in "XYZ"]
     )
-    tool, rapid = of_samples(blocks, machine, np.round(result["program_sample"]).astype(int))
+    tool, rapid = _moves_of(blocks, machine, np.round(result["program_sample"]).astype(int))
     for number, rows in _stretches(tool):
         if number in carving.tools:
             T = float(result["time"][1] - result["time"][0])
             line = result["program_line"][rows].astype(int)
             carving.positions(carving.tool(number), points[rows], line, rapid[rows], T)
+
+
+def _moves_of(blocks: list[PathBlock], machine: Machine, sample: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The tool's number, and whether the move is a rapid, of each planned sample (n) of a program's motion."""
+    import numpy as np
+
+    from rds.interpolators.motion.limits import Limits
+    from rds.interpolators.motion.planner import plan
+
+    tool = np.concatenate([np.zeros(0, int), *(np.full(len(block), block.tool) for block in blocks)])
+    rapid = np.concatenate([np.zeros(0, bool), *(block.segments["rapid"] for block in blocks)])
+    if not len(tool):
+        return np.zeros(len(sample), int), np.zeros(len(sample), bool)
+    planned = plan(blocks, Limits.of(machine), machine.sample_period, start=np.zeros(6))
+    segment = np.concatenate([np.zeros(0, int), *(block.segment for block in planned)])
+    of = segment[np.clip(sample, 0, len(segment) - 1)].clip(0, len(tool) - 1)
+    return tool[of], rapid[of]
 
 
 def _stretches(tool: np.ndarray) -> Iterable[tuple[int, slice]]:

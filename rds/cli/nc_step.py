@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from rds.cli.canon import until_nobody_reads
 from rds.cli.common import Json, print_json, refusals
 from rds.cli.nc_options import MaxJumps, Parameters, Program, Tools, With, setup
 
@@ -28,7 +29,7 @@ def step(
 
     In a terminal Enter goes on by a line; elsewhere all lines are printed. Lines that a branch passes over have a -.
     """
-    with refusals():
+    with refusals(), until_nobody_reads():
         from rds.nc.stepping import steps
 
         what = setup(tools, parameters, with_, max_jumps)

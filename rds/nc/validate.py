@@ -6,9 +6,10 @@ the spindle within its range; both within what the tool bears; no move of an axi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import only_rotary
 from rds.nc.path_block import DefaultFeed
 from rds.nc.tool_centre import slowed
-from rds.nc.tool_limits import ToolLimits, limits_of
 from rds.nc.validation import UNITS_OF_AXES, Validation, plain
 
 if TYPE_CHECKING:
@@ -35,6 +35,22 @@ MOST_WARNINGS = 100  # are kept
 RUNAWAY = 1000  # times that a line has left the travel, each time farther out: its loop is not followed further
 _FASTER = 1.0 + 1e-9  # a feed is too fast by more than rounding
 LINEAR, ROTARY = slice(0, 3), slice(3, 6)  # of the axes
+_MAX = re.compile(r"\bmax((?:\s+[SF]\s*\d+(?:\.\d*)?)+)", re.IGNORECASE)
+_WORD = re.compile(r"([SF])\s*(\d+(?:\.\d*)?)", re.IGNORECASE)
+
+
+class ToolLimits(NamedTuple):
+    """The most that a tool bears; inf where nothing is said."""
+
+    speed: float = inf  # rev/min
+    feed: float = inf  # mm/min
+
+
+def tool_limits(comment: str) -> ToolLimits:
+    """The limits in the comment of a tool's line: after the word `max`, S in rev/min and F in mm/min."""
+    found = _MAX.search(comment)
+    words = {letter.upper(): float(value) for letter, value in _WORD.findall(found[1])} if found else {}
+    return ToolLimits(words.get("S", inf), words.get("F", inf))
 
 
 class Validator:
@@ -46,7 +62,7 @@ class Validator:
     def __init__(self, machine: Machine, tools: Iterable[Tool] = (), name: str = ""):
         self._machine, self._name = machine, name
         self._slowed = False  # a move for the tip is slowed down by a joint
-        self._tools = limits_of(tools)
+        self._tools = {tool.number: tool_limits(tool.comment) for tool in tools}
         limits = Limits.of(machine)
         self._present = limits.present
         self._velocity = limits.velocity

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -161,6 +164,21 @@ def test_step_and_probe_surface_on_the_command_line(tmp_path: Path) -> None:
     assert found[2]["changed"]["#1"] == pytest.approx(-3.5)
     refused = CliRunner().invoke(app, ["nc", "step", str(part), "--with", "probe-surface=low"])
     assert refused.exit_code == 2 and "height in mm" in refused.output
+
+
+@pytest.mark.parametrize("command", ["canon", "step"])
+def test_a_reader_that_has_seen_enough_ends_the_printing_without_a_word(tmp_path: Path, command: str) -> None:
+    """As `rds nc step part.ngc | head` does."""
+    part = program(tmp_path, "G21 G90 G94\nM2\n")
+    reads, writes = os.pipe()
+    os.close(reads)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "rds", "nc", command, str(part)], stdout=writes, stderr=subprocess.PIPE, text=True
+        )
+    finally:
+        os.close(writes)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_an_out_that_is_named_like_a_file_means_its_folder(tmp_path: Path) -> None:

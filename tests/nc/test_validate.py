@@ -16,9 +16,8 @@ from rds.machines import load_machine
 from rds.nc.check import Setup, check_program
 from rds.nc.extent import extents
 from rds.nc.fault_columns import find_word
-from rds.nc.tool_limits import tool_limits
 from rds.nc.trace import MOST_POINTS, Trace, sample
-from rds.nc.validate import MOST_FAULTS
+from rds.nc.validate import MOST_FAULTS, tool_limits
 from rds.nc.validation import Validation, plain
 
 TOOLS = "T1 P1 Z10 D3 ;end mill, max S8000 F400\nT2 P2 D6 ;face mill\n"

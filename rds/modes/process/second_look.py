@@ -5,7 +5,7 @@
 A stall that struck while the student's code ran looks like running time. The code is deterministic by contract, so
 calls with the same arguments take as long again if they took long by their own doing, and don't if they didn't.
 What else the code does must not happen twice: where it starts a process, writes a file, or opens a connection, the
-second look ends without an answer (see `no_effects`). So it does where it would take more than `MEMORY`.
+second look ends without an answer (see `forbid_effects`). So it does where it would take more than `MEMORY`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter_ns as now
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
@@ -27,7 +27,6 @@ from rds.modes.loop.plan import Plan, dump, load
 from rds.modes.loop.program import InterpolatedProgram
 from rds.modes.parts import start
 from rds.modes.process.host import Rows
-from rds.modes.process.no_effects import forbid_effects
 from rds.modes.process.record import write_whole
 from rds.modes.process.replay import as_recorded
 
@@ -39,6 +38,18 @@ except ImportError:  # Windows
 PASSES = 3
 STARTING = 10.0  # s for the process to begin
 MEMORY = 1 << 30  # bytes of data: code that leaks does not fill the computer pass after pass
+_EFFECTS = {
+    "subprocess": "Popen",
+    "os": "system fork forkpty exec posix_spawn spawn startfile kill killpg remove rename mkdir rmdir truncate link "
+    "symlink chmod chown utime putenv unsetenv setxattr removexattr",
+    "socket": "connect bind sendto sendmsg",
+    "shutil": "rmtree move copyfile copytree make_archive",
+    "signal": "pthread_kill",
+    "webbrowser": "open",
+    "_thread": "start_new_thread start_joinable_thread",
+}
+_FORBIDDEN = frozenset(f"{module}.{name}" for module, names in _EFFECTS.items() for name in names.split())
+_WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
 def own_times(plan: Plan, rows: Rows, which: np.ndarray) -> np.ndarray | None:
@@ -136,6 +147,24 @@ def _pass(plan: Plan, samples: list[int], measured: np.ndarray, acting: np.ndarr
         times[i] = max(span - thread.taken(span), 0)
     thread.close()
     return times
+
+
+def forbid_effects() -> list[str]:
+    """From here on, refuse what has an effect outside this process; the list fills with what was refused.
+
+    It holds for the rest of the process, and for Python code: it keeps work from being done twice and is no sandbox.
+    """
+    refused: list[str] = []
+    sys.dont_write_bytecode = True
+
+    def look(event: str, arguments: tuple[Any, ...]) -> None:
+        is_write = event == "open" and isinstance(arguments[2], int) and bool(arguments[2] & _WRITING)
+        if is_write or event in _FORBIDDEN:
+            refused.append(event)
+            raise PermissionError(f"{event} is not done a second time")
+
+    sys.addaudithook(look)
+    return refused
 
 
 def _limit_memory() -> None:
