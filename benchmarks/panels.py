@@ -95,7 +95,7 @@ def run() -> list[Figure]:
         Figure("a press that goes to a panel that is open, to the panel", "ms", tuple(answered), 100.0),
         Figure("from Hold to its confirmation, both cores busy", "ms", tuple(held), 500.0),
         Figure("from one picture of the machine in motion to the next", "ms", tuple(pictures), 100.0),
-        Figure("kernel, live strip of a run at 10 Hz", "% of a core", tuple(costs), 3.0),
+        Figure("kernel, live strip of a run at 10 Hz", "% of a core", tuple(costs), 2.0),
         Figure("kernel, with the machine in motion too", "% of a core", tuple(in_motion), 3.0),
         Figure("main thread of the browser, with the machine in motion too", "% of a core", tuple(main_thread), 30.0),
         Figure("its tasks, with their waits for a core and for the pictures", "% of the time", tuple(occupied)),

@@ -41,7 +41,7 @@ def long_kernel(function: F) -> F:
 
 def tiered_kernel(function: F) -> F:
     """The same, in Python until this process has spent LONG in such kernels: a short program never waits for the
-    compiler. Both give the same samples, so that it makes no difference when that is.
+    compiler. Compiled and plain give the same samples, so it does not matter when one takes the other's place.
     """
     return cast(F, TieredKernel(function, _compiled(function))) if COMPILED else function
 
