@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from threading import local
 from time import perf_counter
 from typing import Any, TypeVar, cast
 
@@ -46,13 +47,22 @@ def tiered_kernel(function: F) -> F:
     return cast(F, TieredKernel(function, _compiled(function))) if COMPILED else function
 
 
+class _Within(local):
+    """Of each thread: when it entered the kernel that it runs in Python and that no other one called; 0 outside."""
+
+    since = 0.0
+
+
 class TieredKernel:
-    """Callable from Python in either way, and from compiled kernels as the compiled one."""
+    """Callable from Python in either way, and from compiled kernels as the compiled one.
+
+    Kernels that one in Python calls look at the clock too: one call may take long, of which they do most of the work.
+    """
 
     __slots__ = ("compiled", "plain")
     spent = 0.0  # s, of all of them in Python
     enough = LONG
-    is_within = False  # another kernel that runs in Python
+    within = _Within()
 
     def __init__(self, plain: Callable[..., Any], compiled: Any) -> None:
         self.plain, self.compiled = plain, compiled
@@ -60,18 +70,19 @@ class TieredKernel:
             TieredKernel.enough = LOADED
 
     def __call__(self, *values: Any, **named: Any) -> Any:
-        of = TieredKernel
-        if of.is_within:
-            return self.plain(*values, **named)
-        if of.spent >= of.enough:
+        of, now = TieredKernel, perf_counter()
+        since = of.within.since
+        if of.spent + (now - since if since else 0.0) >= of.enough:
             return self.compiled(*values, **named)
-        began, of.is_within = perf_counter(), True
+        if since:
+            return self.plain(*values, **named)
+        of.within.since = now
         try:
             with np.errstate(all="ignore"):  # compiled ones say nothing either
                 return self.plain(*values, **named)
         finally:
-            of.is_within = False
-            of.spent += perf_counter() - began
+            of.within.since = 0.0
+            of.spent += perf_counter() - now
 
     @property
     def _numba_type_(self) -> Any:
