@@ -210,7 +210,9 @@ def run(
         else:
             with progress_bars() as bar:
                 results = [part.run(out=folder, changes=changes, progress=bar(plan.mode))]
-        made = [(result, save_run(result, *each)) for result, each in zip(results, runs, strict=True)]
+        with progress_bars() as bar:
+            bar("report")
+            made = [(result, save_run(result, *each)) for result, each in zip(results, runs, strict=True)]
     result, files = made[-1]
     if json:
         told = {"program": result.meta["program"], "changes": result.meta["changes"]}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from math import inf
 from pathlib import Path
 from threading import local
 from time import perf_counter
@@ -24,7 +25,7 @@ except ImportError:  # the extra is not installed
 else:
     COMPILED = not vars(config)["DISABLE_JIT"]  # which a user sets to look into a kernel
 
-LONG = 10.0  # s that tiered kernels run in Python before they are compiled
+LONG = 20.0  # s that tiered kernels run in Python before they are compiled
 LOADED = 0.3  # s, the same where compiled ones are kept on disk: loading takes about as long
 
 _CHANGED: dict[Path, float] = {}  # folders of kernels, and when a file there was last changed
@@ -45,6 +46,11 @@ def tiered_kernel(function: F) -> F:
     compiler. Compiled and plain give the same samples, so it does not matter when one takes the other's place.
     """
     return cast(F, TieredKernel(function, _compiled(function))) if COMPILED else function
+
+
+def compile_tiered() -> None:
+    """From here on, tiered kernels are compiled: what is to be done is known to be long."""
+    TieredKernel.spent = inf
 
 
 class _Within(local):

@@ -194,8 +194,12 @@ class _Planner:
         return float(seconds[way > 0.0].sum())
 
     def run(self, final: bool) -> Iterator[SampleBlock]:
-        if not final and sum(map(len, self.waiting)) < ENOUGH:
-            return
+        if not final:
+            if sum(map(len, self.waiting)) < ENOUGH:
+                return
+            from rds.core.compiling import compile_tiered  # numba, where it is installed
+
+            compile_tiered()
         self._gather()
         if self.point is None:
             if not final and not len(self.new):

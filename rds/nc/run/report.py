@@ -15,7 +15,7 @@ from rds.results.reports.content import Report, Table
 from rds.results.reports.write import write
 
 KIND = "program"
-LOOKED_AT = 60.0  # s of motion for which it is looked for what would save a second, which takes some 30 plans
+LOOKED_AT = 20.0  # s of motion for which it is looked for what would save a second, which takes some 30 plans
 _WORST = 5  # lines in a table
 _TEXT = 60  # characters of a program line
 _CHANGES = 200  # in a table
