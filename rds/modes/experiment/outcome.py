@@ -42,11 +42,28 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     if mode.followed and plan.controlled and plan.repeatable:
         columns |= _simulated(plan, rows, sample)
     meta = _description(plan, rows) | known
+    meta["notes"] += _beyond_travel(plan, columns)
     if mode.real_time:
         meta |= _judged(plan, rows, sample)
         if note := bus_note(meta["drivers"], meta["bus"]):
             meta["notes"].append(note)
     return Result(columns, units, meta)
+
+
+def _beyond_travel(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
+    """A sentence for each axis that was not where its machine lets it be, which an unstable law does first of all."""
+    said = []
+    for axis in (part.axis for part in plan.axes):
+        measured = columns.get(f"{axis.name}_measured", np.empty(0))
+        low, high = axis.travel
+        if axis.unit == "rev/min" or not ((measured < low) | (measured > high)).any():
+            continue
+        there = "a machine would have stopped there" if plan.mode == SIMULATION else "check it"
+        said.append(
+            f"{axis.name} was between {measured.min():.4g} and {measured.max():.4g} {axis.unit}, but travels from "
+            f"{low:g} to {high:g}; {there}: look at the sign and the gains of the law, and at the reference"
+        )
+    return said
 
 
 def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarray]:
