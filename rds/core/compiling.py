@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from contextvars import copy_context
 from pathlib import Path
 from threading import local
 from time import perf_counter
@@ -78,11 +79,15 @@ class TieredKernel:
             return self.plain(*values, **named)
         of.within.since = now
         try:
-            with np.errstate(all="ignore"):  # compiled ones say nothing either
-                return self.plain(*values, **named)
+            # In a context that ends with the call, else an interruption may leave numpy's warnings off.
+            return copy_context().run(self._silently, *values, **named)
         finally:
             of.within.since = 0.0
             of.spent += perf_counter() - now
+
+    def _silently(self, *values: Any, **named: Any) -> Any:
+        with np.errstate(all="ignore"):  # compiled kernels say nothing either
+            return self.plain(*values, **named)
 
     @property
     def _numba_type_(self) -> Any:
