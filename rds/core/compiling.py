@@ -23,7 +23,7 @@ try:
 except ImportError:  # the extra is not installed
     COMPILED = False
 else:
-    COMPILED = not config.DISABLE_JIT  # which a user sets to look into a kernel
+    COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined, unused-ignore]  # which a user sets to look into a kernel
 
 LONG = 10.0  # s that tiered kernels run in Python before they are compiled
 LOADED = 0.3  # s, the same where compiled ones are kept on disk: loading takes about as long
