@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from contextvars import copy_context
 from math import inf
 from pathlib import Path
 from threading import local
@@ -26,7 +27,7 @@ else:
     COMPILED = not vars(config)["DISABLE_JIT"]  # which a user sets to look into a kernel
 
 LONG = 20.0  # s that tiered kernels run in Python before they are compiled
-LOADED = 0.3  # s, the same where compiled ones are kept on disk: loading takes about as long
+LOADED = 0.1  # s, the same where compiled ones are kept on disk: loading takes about as long
 
 _CHANGED: dict[Path, float] = {}  # folders of kernels, and when a file there was last changed
 
@@ -84,11 +85,15 @@ class TieredKernel:
             return self.plain(*values, **named)
         of.within.since = now
         try:
-            with np.errstate(all="ignore"):  # compiled ones say nothing either
-                return self.plain(*values, **named)
+            # In a context that ends with the call, else an interruption may leave numpy's warnings off.
+            return copy_context().run(self._silently, *values, **named)
         finally:
             of.within.since = 0.0
             of.spent += perf_counter() - now
+
+    def _silently(self, *values: Any, **named: Any) -> Any:
+        with np.errstate(all="ignore"):  # compiled kernels say nothing either
+            return self.plain(*values, **named)
 
     @property
     def _numba_type_(self) -> Any:

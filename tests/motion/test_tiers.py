@@ -133,3 +133,30 @@ def test_after_an_interruption_in_a_kernel_the_next_one_is_a_first_one() -> None
     TieredKernel.spent = 0.0
     tiered(lambda: sum(range(1000)))()
     assert TieredKernel.spent > 0.0
+
+
+@pytest.mark.skipif(np.lib.NumpyVersion(np.__version__) < "2.0.0", reason="it is by context from numpy 2 on")
+@pytest.mark.usefixtures("all_in_python")
+def test_an_interruption_anywhere_leaves_the_warnings_as_they_were() -> None:
+    before, kernel = np.geterr(), tiered(lambda: "done")
+    found, calls = None, 0
+    while found is None:
+        calls += 1
+        left = calls
+
+        def interrupt(*_: object) -> None:
+            nonlocal left
+            left -= 1
+            if not left:
+                raise KeyboardInterrupt
+
+        tracing = sys.gettrace()
+        sys.settrace(interrupt)
+        try:
+            found = kernel()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            sys.settrace(tracing)
+        assert np.geterr() == before
+    assert calls > 3
