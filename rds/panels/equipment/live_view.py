@@ -65,10 +65,9 @@ class LiveView:
             self.strip.layout.display = ""
             self.strip.begin(traces)
             self._stand_behind()
-            self.scene.begin(traces, run.real_time)
+            self.scene.begin(traces, run.real_time, self.strip.stream)
         if self._traces and len(rows := run.new_rows()):
-            self.strip.add(rows)
-            self.scene.add(rows)
+            self.scene.show(self.strip.add(rows))
         if run.real_time and not self._is_live and run.live_values:
             self._is_live = True
             self._parameters.show_live(LiveValues(run), isinstance(run, EquipmentRun))

@@ -47,7 +47,7 @@ class StripChart(anywidget.AnyWidget):
 
     def __init__(self, **options: Any):
         super().__init__(_esm=_module(), _style=(_STATIC / "uPlot.min.css").read_text(encoding="utf-8"), **options)
-        self._stream = RowStream()
+        self.stream = RowStream()
         self._ghost = np.empty((0, 1))
         self.on_msg(self._asked)
 
@@ -55,14 +55,15 @@ class StripChart(anywidget.AnyWidget):
         """Empty, with these traces: (name, unit) each, in lanes by quantity and unit."""
         self.events = []
         self.traces = dressed(traces)
-        self._stream = RowStream(len(traces))
+        self.stream = RowStream(len(traces))
         self.send({"kind": "clear"})
 
-    def add(self, rows: np.ndarray) -> None:
-        """More rows, (n, 1 + traces)."""
-        chosen = self._stream.add(rows)
+    def add(self, rows: np.ndarray) -> np.ndarray:
+        """More rows, (n, 1 + traces); those that are shown."""
+        chosen = self.stream.add(rows)
         if len(chosen):
             self._deliver(chosen)
+        return chosen
 
     def stand_behind(self, rows: np.ndarray, name: str) -> None:
         """Draw an earlier run `name` behind: rows as of `add`, with nan for what it does not have. No rows: none."""
@@ -82,8 +83,8 @@ class StripChart(anywidget.AnyWidget):
         if content == {"kind": "all"}:
             self.send_state(["traces", "events", "ghost"])
             self.send({"kind": "clear"})
-            if len(self._stream.rows):
-                self._deliver(self._stream.rows)
+            if len(self.stream.rows):
+                self._deliver(self.stream.rows)
             if len(self._ghost):
                 self._deliver_ghost()
 

@@ -19,7 +19,7 @@ class RowStream:
         """Those that come faster than RATE are left out."""
         rows = np.asarray(rows, dtype=float)
         keep = []
-        for index, time in enumerate(rows[:, 0]):
+        for index, time in enumerate(rows[:, 0].tolist()):
             if time >= self._next - 1e-9:
                 keep.append(index)
                 self._next = time + 1.0 / RATE

@@ -10,7 +10,7 @@ import ipywidgets as widgets
 
 from rds.panels.kit.ticker import Ticker
 
-_SECONDS = 0.4  # between two showings: each costs the kernel and the page two messages
+_SECONDS = 1.0  # between two showings, as the seconds left are counted: each costs kernel and page two messages
 
 
 class Work(Protocol):

@@ -47,16 +47,19 @@ class MachineScene(anywidget.AnyWidget):
         self._intended = np.empty(0, dtype="<f4")
         self.on_msg(self._asked)
 
-    def begin(self, traces: Sequence[tuple[str, str]], live: bool) -> None:
-        """Empty, with these traces: (name, unit) each."""
+    def begin(self, traces: Sequence[tuple[str, str]], live: bool, beside: RowStream | None = None) -> None:
+        """Empty, with these traces: (name, unit) each. Where a strip shows the same rows, `beside` are that strip's."""
         self.live = live
         self.columns = [name for name, _ in traces]
-        self._stream = RowStream(len(traces))
+        self._stream = RowStream(len(traces)) if beside is None else beside
         self.send({"kind": "clear"})
 
     def add(self, rows: np.ndarray) -> None:
         """More rows, (n, 1 + traces)."""
-        chosen = self._stream.add(rows)
+        self.show(self._stream.add(rows))
+
+    def show(self, chosen: np.ndarray) -> None:
+        """What the strip beside it was given, and has chosen."""
         if len(chosen) and self.shows:
             self._deliver(chosen)
 
