@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
@@ -143,7 +144,9 @@ def _table_or_student(words: TomlTable, key: str, setting: Setting) -> tuple[Tom
     nameless = words.table_of(key, {})
     if isinstance(given, StudentFile):
         return nameless, given
-    if isinstance(given, str):
+    if isinstance(given, os.PathLike):
+        given = {"file": os.fspath(given)}
+    elif isinstance(given, str):
         given = {"file" if given.endswith((".py", ".toml")) else "name": given}
     elif isinstance(given, dict) and any(callable(given.get(name)) for name in _FUNCTIONS):
         with named(nameless):

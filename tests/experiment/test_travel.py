@@ -1,0 +1,27 @@
+"""A run whose axis was beyond its travel says so: an unstable law is the commonest mistake of a first week."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rds import Experiment
+
+LAW = """params = {{"Kp": 30.0}}
+initial_state = []
+
+
+def control(t, r, y, state, params):
+    return params["Kp"] * ({error}), state
+"""
+
+
+@pytest.mark.parametrize(("error", "is_told"), [("y - r.position", True), ("r.position - y", False)])
+def test_a_run_that_leaves_the_travel_is_told(tmp_path: Path, error: str, is_told: bool) -> None:
+    (tmp_path / "law.py").write_text(LAW.format(error=error))
+    reference = {"kind": "sinusoid", "amplitude": 5.0, "frequency": 0.2}
+    result = Experiment(controller=tmp_path / "law.py", reference=reference, duration=10.0).run()
+    told = [note for note in result.meta["notes"] if "travels from -75 to 75" in note]
+    assert bool(told) is is_told
+    assert bool(abs(result["X_measured"]).max() > 75.0) is is_told
