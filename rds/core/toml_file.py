@@ -54,7 +54,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"is not valid TOML: {error}", where) from error
+        raise InputError(f"is not valid TOML: {error}{_quoted(text, str(error))}", where) from error
     except RecursionError as error:
         raise InputError("has brackets within brackets hundreds deep; write it flatter", where) from error
     except ValueError as error:  # of a number with more digits than Python reads, or a date such as February 30
@@ -63,6 +63,13 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         raise InputError(f"has a number or date that cannot be read ({error!s:.100}); correct it", place) from error
     _check_tree(table, text, where)
     return table
+
+
+def _quoted(text: str, said: str) -> str:
+    """The line that tomllib means, and the two rules that beginners break."""
+    found = re.search(r"at line (\d+)", said)
+    line = text.split("\n")[int(found[1]) - 1].strip() if found else ""
+    return f": `{line:.100}`; texts stand in quotation marks, numbers stand without a unit" if line else ""
 
 
 def _check_dots(text: str, where: str) -> None:

@@ -43,10 +43,11 @@ class Experiment:
     """One or more axes of a machine, driven by controllers after references, or by voltage signals.
 
     The arguments are the keys of an experiment file (docs/experiments.md), with these liberties: `controller`
-    may be a library name, the path of a student's .py file (text or Path), a function `control(t, r, y, state, params)`,
-    `globals()` of a notebook that defines one, a python-control system, an `rds.Controller`, or a table (dict);
-    `model` likewise with `derivatives` or `advance`; `reference` and `signal` a signal (`rds.sinusoid(5.0, 0.2)`),
-    a function of time, or a table. `axis` may be one name or several; with several, `overrides` such as
+    may be a library name, the path of a student's .py file (text or Path), a function
+    `control(t, r, y, state, params)`, `globals()` of a notebook that defines one, a python-control system, an
+    `rds.Controller`, or a table (dict); `model` likewise with `derivatives` or `advance`; `reference` and `signal` a
+    signal (`rds.sinusoid(5.0, 0.2)`), a function of time, or a table. `axis` may be one name or several; with several,
+    `overrides` such as
     {"Y": {"controller": ...}} differ for one axis. `duration` is 10 s unless it is given; with a path as `reference`
     (`{"kind": "path", ...}`, docs/experiments.md) the path says how long the run lasts. What is wrong
     raises InputError at once.
