@@ -98,13 +98,18 @@ class TomlTable:
     def missing(self, key: str) -> InputError:
         """The error that a key that is needed is not there."""
         declared = self._of(key)
-        slip = get_close_matches(key, [name for name in self.table if name not in self._asked], n=1)
-        hint = f"; is '{slip[0]}' meant to be it?" if slip else ""
         remedy = f"add it ({declared.meaning})"
         if isinstance(declared, Quantity):
             unit = f"it in {declared.unit}" if declared.unit else "a number"
             remedy = f"give {unit}, as in `{key} = {1 if declared.whole else 1.0}`"
-        return InputError(f"{key} is missing; {remedy}{hint}", self.place())
+        return InputError(f"{key} is missing; {remedy}{self.slip(key)}", self.place())
+
+    def slip(self, key: str) -> str:
+        """A hint at a key that nobody has asked for and that may be meant to be `key`, which is missing."""
+        tables = [self] if self._general is None else [self, self._general]
+        others = [name for table in tables for name in table.table if name not in table._asked]
+        close = get_close_matches(key, others, n=1)
+        return f"; is '{close[0]}' meant to be it?" if close else ""
 
     def _of(self, key: str) -> Declaration:
         assert self.declared is not None, f"{key} is read from a table without a declaration"

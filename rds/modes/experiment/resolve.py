@@ -244,12 +244,13 @@ def _axis_plan(
         plan = AxisPlan(axis, model, controller, command=command, most_target=most)
     elif driven == "signal":
         if "signal" not in words:
-            raise InputError(f"axis {axis.name} has no [signal]", words.place())
+            raise InputError(f"axis {axis.name} has no [signal]{words.slip('signal')}", words.place())
         signal = make_drive(words, "signal", setting, "V")
         plan, period = AxisPlan(axis, model, signal=signal.value(times).tolist()), signal.period
     else:
         if "reference" not in words:
-            raise InputError(f'axis {axis.name} has no [reference]; as in `kind = "sinusoid"`', words.place())
+            said = f'axis {axis.name} has no [reference]; as in `kind = "sinusoid"`{words.slip("reference")}'
+            raise InputError(said, words.place())
         reference = make_drive(words, "reference", setting, axis.unit)
         samples_of = ReferenceSamples(*(np.asarray(part, dtype=float) for part in reference.reference(times)))
         _check_travel(samples_of, axis, words)
