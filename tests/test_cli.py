@@ -47,6 +47,7 @@ METRICS = {"mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_ab
 def folder(alone: Path) -> Path:
     (alone / "e.toml").write_text(SIMULATION)
     (alone / "law.py").write_text(LAW)
+    (alone / "part.ngc").write_text("G21 G1 X1 F60\nM2\n")
     (alone / "model.py").write_text(
         "def derivatives(t, x, u, params):\n    return [x[1], 100.0 * (2.0 * u[0] - x[1])]\n"
     )
@@ -141,11 +142,12 @@ BAD_INPUT = [
     (["run", "e.toml", "--mode", "fly"], "unknown mode 'fly'; known modes: simulation"),
     (["run", "e.toml", "--mode", ""], "unknown mode ''; known modes: simulation"),
     (["run", "e.toml", "--mode", "system-test"], "give [signal]"),
-    (["run", "law.py"], "law.py: is not valid TOML"),
+    (["run", "law.py"], "law.py: it is a Python file: an experiment names it"),
+    (["run", "part.ngc"], "it is a part program: `rds nc run part.ngc` runs it"),
     (["run", "e.toml", "--out", "law.py"], "law.py"),
     (["run", "e.toml", "-m", "emulation", "--out", "law.py"], "law.py: is a file, not a folder"),
     (["check", "gone.py"], "gone.py: there is no such file"),
-    (["check", "e.toml"], "e.toml"),
+    (["check", "e.toml"], "it looks like an experiment, which `rds run` takes"),
     (["check", "law.py", "--sample-period", "0"], "must be from 1e-06 to 1000 s"),
     (["check", "model.py", "--axes", "2"], "it defines no control(t, r, y, state, params)"),
     (["check", "e.toml", "--axes", "2"], "--axes 2 is for a coupled controller"),

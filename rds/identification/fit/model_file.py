@@ -213,10 +213,10 @@ def read_model(path: str | Path) -> ModelFile:
     """
     words = TomlTable.open(path, MODEL_FILE)
     if "parameters" not in words:
-        raise InputError(
-            "it is no model file: there is no [parameters]; `rds fit LOG --structure axis -o MODEL.toml` makes one",
-            words.place(),
-        )
+        makes = "`rds fit LOG --structure axis -o MODEL.toml` makes one"
+        if "reference" in words or "controller" in words:
+            makes = f"it looks like an experiment, which `rds run` takes; {makes}"
+        raise InputError(f"it is no model file: there is no [parameters]; {makes}", words.place())
     words.read("format")
     structure = words.read("structure")
     if not structure:
