@@ -141,7 +141,7 @@ def test_what_holds_a_motion_back_adds_up_and_a_raised_limit_saves_a_second(tmp_
 
 def test_the_certificate_of_a_run_shows_what_holds_it_back(tmp_path: Path) -> None:
     """Speeds along the path and their causes above the shares of the limits; as the cycle time's picture does."""
-    part = program(tmp_path, "G21 G90 G94\nG0 X60\nX-60\nM8\nG4 P0.5\nX60\nX-60\nG1 X-50 F600\nM2\n")
+    part = program(tmp_path, "G21 G90 G94\nG0 X25\nX-25\nM8\nG4 P0.5\nX25\nX-25\nG1 X-15 F600\nM2\n")
     machine = load_machine("mini-cnc")
     prepared = prepare(part, machine)
     figure = certificate_picture(prepared)
