@@ -20,6 +20,14 @@ MOST_PARTS = 16  # of a dotted key; ours have four
 DEEPEST = 64  # tables and arrays in each other
 LONGEST_KEY = 200  # characters
 _LONG = re.compile(r"[+-]?(?:0x[0-9a-fA-F_]{16,}|0o[0-7_]{21,}|0b[01_]{63,}|[0-9][0-9_]{18,})")
+_RULES = "; texts stand in quotation marks, numbers have a point and no unit"
+_REMEDIES = {  # by what tomllib says
+    "Invalid value": _RULES,
+    "Expected newline": _RULES,
+    "Cannot overwrite": "; it stands there twice: remove one of them",
+    "twice": "; remove one of them",
+    "Unterminated string": "; end it with a quotation mark",
+}
 _WHOLE = 2**63  # TOML's whole numbers have 64 bits
 # Texts and comments are a token each, closed or not: no dot in them counts, no character is looked at twice.
 _TOKEN = re.compile(
@@ -66,10 +74,11 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 
 
 def _quoted(text: str, said: str) -> str:
-    """The line that tomllib means, and the two rules that beginners break."""
+    """The line that tomllib means, and what to do where it does not say so itself."""
     found = re.search(r"at line (\d+)", said)
     line = text.split("\n")[int(found[1]) - 1].strip() if found else ""
-    return f": `{line:.100}`; texts stand in quotation marks, numbers stand without a unit" if line else ""
+    remedy = next((remedy for cause, remedy in _REMEDIES.items() if cause in said), "")
+    return (f": `{line:.100}`" if line else "") + remedy
 
 
 def _check_dots(text: str, where: str) -> None:
