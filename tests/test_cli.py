@@ -143,7 +143,7 @@ BAD_INPUT = [
     (["run", "e.toml", "--mode", ""], "unknown mode ''; known modes: simulation"),
     (["run", "e.toml", "--mode", "system-test"], "give [signal]"),
     (["run", "law.py"], "law.py: it is a Python file: an experiment names it"),
-    (["run", "part.ngc"], "it is a part program: `rds nc run part.ngc` runs it"),
+    (["run", "part.ngc"], "part.ngc: it is a part program: `rds nc run` runs it"),
     (["run", "e.toml", "--out", "law.py"], "law.py"),
     (["run", "e.toml", "-m", "emulation", "--out", "law.py"], "law.py: is a file, not a folder"),
     (["check", "gone.py"], "gone.py: there is no such file"),

@@ -149,13 +149,6 @@ def demo(out: Out = None, json: Json = False) -> None:
     raise typer.Exit(outcome.exit_code)
 
 
-_PROGRAM = "it is a part program: `rds nc run {file}` runs it"
-_NO_EXPERIMENTS = {
-    ".py": "it is a Python file: an experiment names it, under [controller] as `file = ...`; `rds check` looks at it",
-    **dict.fromkeys((".ngc", ".nc", ".tap", ".gcode"), _PROGRAM),
-}
-
-
 @app.command()
 @writes_files
 def run(
@@ -175,10 +168,6 @@ def run(
     with refusals(), stdout_kept(json), ends_as_ctrl_c():
         from rds.modes.experiment.report import exit_code, run_and_save, run_json
 
-        if experiment.is_file() and (instead := _NO_EXPERIMENTS.get(experiment.suffix.lower())):
-            from rds.core.errors import InputError
-
-            raise InputError(instead.format(file=experiment), str(experiment))
         say_what_is_replaced(out)
         if exchange is None:
             only_with_exchange(yes, events)

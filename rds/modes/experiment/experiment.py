@@ -39,6 +39,12 @@ class FailedRun(ContractError):
         self.result = result
 
 
+_NO_EXPERIMENTS = {  # by the file's ending
+    ".py": "it is a Python file: an experiment names it, under [controller] as `file = ...`; `rds check` looks at it",
+    **dict.fromkeys((".ngc", ".nc", ".tap", ".gcode"), "it is a part program: `rds nc run` runs it"),
+}
+
+
 class Experiment:
     """One or more axes of a machine, driven by controllers after references, or by voltage signals.
 
@@ -111,6 +117,8 @@ class Experiment:
     @classmethod
     def from_toml(cls, path: str | Path) -> Experiment:
         """The experiment that a file describes; the files that it names are looked for from its own folder."""
+        if (instead := _NO_EXPERIMENTS.get(Path(path).suffix.lower())) and Path(path).is_file():
+            raise InputError(instead, str(path))
         experiment = cls.__new__(cls)
         experiment._words = TomlTable.open(path, EXPERIMENT)
         experiment._folder = Path(path).resolve().parent
