@@ -22,6 +22,6 @@ def test_a_run_that_leaves_the_travel_is_told(tmp_path: Path, error: str, is_tol
     (tmp_path / "law.py").write_text(LAW.format(error=error))
     reference = {"kind": "sinusoid", "amplitude": 5.0, "frequency": 0.2}
     result = Experiment(controller=tmp_path / "law.py", reference=reference, duration=10.0).run()
-    told = [note for note in result.meta["notes"] if "travels from -75 to 75" in note]
+    told = [note for note in result.meta["notes"] if "beyond its travel of -75 to 75 mm" in note]
     assert bool(told) is is_told
     assert bool(abs(result["X_measured"]).max() > 75.0) is is_told
