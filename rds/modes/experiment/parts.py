@@ -87,7 +87,7 @@ def make_controller(words: TomlTable, setting: Setting, model: Model) -> Control
     if given is None:
         raise InputError(
             f"controller of axis {setting.axis.name} is missing; add `[controller]` with `name` or `file`, or a "
-            f"`[signal]` to drive without one",
+            f"`[signal]` to drive without one{words.slip('controller')}",
             words.place(),
         )
     if isinstance(given, Controller):
