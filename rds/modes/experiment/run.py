@@ -16,7 +16,7 @@ from rds.modes.process.live import Live
 from rds.modes.process.record import table
 from rds.results import Result
 
-_POLL = 0.05  # s
+_POLL = 0.1  # s: how often progress is told; the end wakes who waits for it
 
 
 class RunLiveValues:

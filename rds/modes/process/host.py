@@ -43,6 +43,7 @@ Progress = Callable[[int, int], None]  # samples taken, samples in all
 _CHUNK = 5000  # samples between two calls of a simulation's progress
 _RING_BYTES = 64 << 20
 _POLL = 0.05  # s
+_LOOK = 1.0  # s: the end wakes who waits for it
 
 
 @dataclass(frozen=True)
@@ -256,7 +257,7 @@ def _follow(recorder: subprocess.Popen[bytes], ring: Ring, plan: Plan, progress:
         try:
             if progress:
                 progress(ring.head, plan.samples)
-            wait_for_end(recorder, _POLL)
+            wait_for_end(recorder, _POLL if progress else _LOOK)
         except KeyboardInterrupt:
             if ring.stop_asked():
                 raise

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from rds.panels.session.task import Stopped
 
-PERIOD = 0.09  # s: what is a little late still is ten times a second
+PERIOD = 0.1  # s; after a late beat the next one is so much earlier
 PATIENCE = 20  # failures one after the other before a call is given up
 
 
