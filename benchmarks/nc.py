@@ -99,9 +99,9 @@ def reading(place: Path, rounds: int, peer_python: str) -> list[Figure]:
 
 def planning(place: Path, rounds: int) -> list[Figure]:
     """From the file to samples at 1 ms of the mini-CNC's axes: computing time per time of motion."""
-    from rds.core.compiling import TieredKernel
+    from rds.core.compiling import compile_tiered
 
-    TieredKernel.enough = 0.0  # s in Python: the short program is over before the planner would be compiled
+    compile_tiered()  # the short program is over before the planner would be compiled
     file = write_program(place / "planned.ngc", LINES)
     _plan(write_program(place / "short.ngc", SHORT // 10))  # compiles
     results = [_plan(file) for _ in range(rounds)]

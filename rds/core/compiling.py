@@ -6,9 +6,12 @@ motion). Short work does not wait for it: the planner's kernels run in Python un
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from contextvars import copy_context
+from functools import cache
 from math import inf
 from pathlib import Path
 from threading import local
@@ -16,6 +19,8 @@ from time import perf_counter
 from typing import Any, TypeVar, cast
 
 import numpy as np
+
+from rds.core.errors import Notice
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -26,8 +31,11 @@ except ImportError:  # the extra is not installed
 else:
     COMPILED = not vars(config)["DISABLE_JIT"]  # which a user sets to look into a kernel
 
-LONG = 20.0  # s that tiered kernels run in Python before they are compiled
-LOADED = 0.1  # s, the same where compiled ones are kept on disk: loading them all takes some 0.4 s
+LONG = 20.0  # s that tiered kernels run in Python before one is compiled
+LOADED = 0.1  # s, the same of a compiled one that is kept on disk: loading all of them takes some 0.4 s
+_COMPILING = "the planner is being compiled, because this motion is long: that takes some 40 s, once"
+
+_PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"  # in numba's file names
 
 _CHANGED: dict[Path, float] = {}  # folders of kernels, and when a file there was last changed
 
@@ -66,20 +74,25 @@ class TieredKernel:
     Kernels that one in Python calls look at the clock too: one call may take long, of which they do most of the work.
     """
 
-    __slots__ = ("compiled", "plain")
+    __slots__ = ("compiled", "enough", "is_kept", "plain")
     spent = 0.0  # s, of all of them in Python
-    enough = LONG
+    told = False  # that one is being compiled
     within = _Within()
 
     def __init__(self, plain: Callable[..., Any], compiled: Any) -> None:
         self.plain, self.compiled = plain, compiled
-        if TieredKernel.enough > LOADED and any(Path(compiled.stats.cache_path).glob("*.nbi")):
-            TieredKernel.enough = LOADED
+        # Each for itself: while another process compiles them, or after it was interrupted, only some are there.
+        kept = _kept(Path(compiled.stats.cache_path))
+        self.is_kept = any(f".{plain.__qualname__}-" in name and name.endswith(f".{_PYTHON}.nbi") for name in kept)
+        self.enough = LOADED if self.is_kept else LONG
 
     def __call__(self, *values: Any, **named: Any) -> Any:
         of, now = TieredKernel, perf_counter()
         since = of.within.since
-        if of.spent + (now - since if since else 0.0) >= of.enough:
+        if of.spent + (now - since if since else 0.0) >= self.enough:
+            if not (self.is_kept or of.told):
+                of.told = True
+                warnings.warn(Notice(_COMPILING), stacklevel=2)
             return self.compiled(*values, **named)
         if since:
             return self.plain(*values, **named)
@@ -109,6 +122,12 @@ def _compiled(function: F, **options: Any) -> F:
             _CHANGED[folder] = max((file.stat().st_mtime for file in folder.glob("*.py")), default=0.0)
             _forget_old(Path(compiled.stats.cache_path))
     return cast(F, compiled)
+
+
+@cache
+def _kept(folder: Path) -> list[str]:
+    """The names of the indexes that numba has there, as they were when they were asked for first."""
+    return [index.name for index in folder.glob("*.nbi")]
 
 
 def _forget_old(kept: Path) -> None:

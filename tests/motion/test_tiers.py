@@ -19,6 +19,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 
 from rds.core.compiling import TieredKernel
+from rds.core.errors import Notice
 from rds.interpolators.motion.least_time import LeastTime
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import plan
@@ -46,14 +47,12 @@ def tiered(plain: Callable[[], Any]) -> TieredKernel:
 
 @pytest.fixture
 def all_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(TieredKernel, "spent", 0.0)
-    monkeypatch.setattr(TieredKernel, "enough", inf)
+    monkeypatch.setattr(TieredKernel, "spent", -inf)
 
 
 def samples(segments: np.ndarray, limits: Limits, in_python: bool) -> tuple[list[np.ndarray], float]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(TieredKernel, "spent", 0.0)
-        patch.setattr(TieredKernel, "enough", inf if in_python else 0.0)
+        patch.setattr(TieredKernel, "spent", -inf if in_python else inf)
         least_time = LeastTime(limits, T)
         found = [
             column
@@ -96,10 +95,38 @@ def test_one_long_call_does_not_stay_in_python() -> None:
 
     def outer() -> list[str]:
         found = [inner()]
-        TieredKernel.enough = 0.0  # so much has been spent by now
+        TieredKernel.spent = inf  # so much has been by now
         return [*found, inner()]
 
     assert tiered(outer)() == ["in Python", "compiled"]
+
+
+@pytest.mark.usefixtures("all_in_python")
+def test_what_is_not_kept_on_disk_is_compiled_later_and_that_is_said_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process may be compiling them, or was interrupted: then only some of the kernels are there."""
+
+    def kept() -> str:
+        return "in Python"
+
+    def left() -> str:
+        return "in Python"
+
+    version = f"py{sys.version_info.major}{sys.version_info.minor}"
+    (tmp_path / f"kernels.{kept.__qualname__}-1.{version}.nbi").touch()
+    (tmp_path / f"kernels.{left.__qualname__}-9.py22.nbi").touch()  # of another Python
+    monkeypatch.setattr(Compiled, "stats", SimpleNamespace(cache_path=str(tmp_path)))
+    monkeypatch.setattr(TieredKernel, "told", False)
+    kernels = tiered(kept), tiered(left), tiered(left)
+    found = []
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for spent in (0.0, 1.0, 60.0):  # s
+            TieredKernel.spent = spent
+            found.append([kernel() for kernel in kernels])
+    assert found == [["in Python"] * 3, ["compiled", "in Python", "in Python"], ["compiled"] * 3]
+    assert [note.category for note in said] == [Notice]
 
 
 @pytest.mark.usefixtures("all_in_python")
