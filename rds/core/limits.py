@@ -87,7 +87,7 @@ def read_limited(path: str | Path, most: int, what: str, remedy: str) -> bytes:
     `what` is what the file should be: "a parameter file".
     """
     limit = int(most * lifted())
-    with open(path, "rb") as stream:
+    with open(os.fspath(path), "rb") as stream:  # for a number, open takes what has it, and closes that in the end
         data = stream.read(limit + 1)
         if len(data) > limit:
             size = max(os.fstat(stream.fileno()).st_size, limit + 1)  # a device has none

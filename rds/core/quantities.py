@@ -54,7 +54,8 @@ def checked(declaration: Declaration, value: Any, name: str, owner: str = "") ->
 def shortened(value: Any, longest: int = 200) -> str:
     """The value as messages show it."""
     try:
-        return f"{value!r:.{longest}}"
+        shown = f"{value!r:.{longest}}"
+        return " ".join(shown.split()) if "\n" in shown else shown  # an array's, of several lines
     except ValueError:  # Python writes no whole number of more than 4300 digits
         return "a number of thousands of digits"
 

@@ -206,11 +206,12 @@ def machine_names() -> list[str]:
     return sorted(f.name.removesuffix(".toml") for f in files("rds.machines").iterdir() if f.name.endswith(".toml"))
 
 
-def load_machine(name: str) -> Machine:
+def load_machine(name: str | Path) -> Machine:
     """The machine called `name`, or the one described by the TOML file at that path.
 
     Raises InputError for an unknown name, a missing file or a file that does not describe a machine.
     """
+    name = str(name)
     path = Path(name) if name.endswith(".toml") else Path(str(files("rds.machines").joinpath(f"{name}.toml")))
     if not path.is_file():
         names = machine_names()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -144,6 +145,8 @@ def compare(a: Result, b: Result) -> Comparison:
     Nothing is interpolated: results of different sample periods, or whose times are not multiples of it, have no
     common samples, and are refused. Raises InputError for these, and for results without a common axis or sample.
     """
+    if path := next((each for each in (a, b) if isinstance(each, str | Path)), None):
+        raise InputError(f"{path} is no result; rds.open_result opens the one that is there")
     T = a.sample_period
     if not math.isclose(T, b.sample_period, rel_tol=1e-9):
         raise InputError(

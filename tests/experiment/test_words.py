@@ -311,7 +311,7 @@ def test_the_same_in_python() -> None:
         ({"controller": 3}, "controller = 3 must be a name"),
         ({"controller": lambda t: 0.0}, "cannot tell which interface"),
         ({"controller": "tracking.py"}, "there is no such file as .*tracking.py"),
-        ({"reference": 3}, "reference = 3 must be a table"),
+        ({"reference": 3}, "reference = 3 must be a signal"),
         ({"reference": None}, r"has no \[reference\]"),
         ({"reference": rds.sinusoid(1.0, 600.0)}, "above half the sampling frequency"),
         ({"model": 3}, "model = 3 must be a name"),

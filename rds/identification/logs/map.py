@@ -108,6 +108,8 @@ class LogMap:
 
 def beside(path: Path) -> Path | None:
     """The map that belongs to a data file by its name, if there is one."""
+    if not path.name:  # the folder that one is in
+        return None
     found = path.with_name(path.name + SUFFIX)
     return found if found.is_file() else None
 

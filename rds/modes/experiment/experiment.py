@@ -65,7 +65,7 @@ class Experiment:
 
     def __init__(
         self,
-        machine: str = "mini-cnc",
+        machine: str | Path = "mini-cnc",
         axis: str | Sequence[str] = "X",
         mode: str = DEFAULT,
         duration: float | None = None,
@@ -88,7 +88,7 @@ class Experiment:
             duration = 10.0
         given: dict[str, Any] = {
             "title": title,
-            "machine": machine,
+            "machine": str(machine) if isinstance(machine, Path) else machine,
             "mode": mode,
             "duration": duration,
             "sample_period": sample_period,

@@ -114,6 +114,9 @@ def make_controller(words: TomlTable, setting: Setting, model: Model) -> Control
 def make_drive(words: TomlTable, key: str, setting: Setting, unit: str) -> Signal:
     """The reference or the voltage signal of an axis, in `unit`. InputError if sampling is too slow for it."""
     given = words.any(key)
+    if not words.path and not isinstance(given, Signal | Mapping | None) and not callable(given):
+        makers = 'rds.sinusoid(5.0, 0.2), or rds.user(file="rows.csv") of a file'
+        raise words.fault(key, f"must be a signal ({makers}), a function of the time, or a dict")
     table = words.inner(key) if not isinstance(given, Signal) and not callable(given) else None
     with named(table or words.table_of(key, {})):
         signal = _signal(given, table, setting, unit)

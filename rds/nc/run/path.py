@@ -231,6 +231,7 @@ def of_part_program(
 def method_of(words: TomlTable, folder: Path) -> Method:
     """What the words `interpolator`, `params`, `acceleration`, `exact_stop` and `look_ahead` of a table ask for."""
     given = words.any("interpolator", DEFAULT)
+    given = str(given) if isinstance(given, Path) else given
     params = words.inner("params")
     options = dict(params.table) if params else {}
     if isinstance(given, Interpolator):

@@ -166,7 +166,7 @@ class PartProgram(Experiment):
     def __init__(
         self,
         file: str | Path,
-        machine: str | None = None,
+        machine: str | Path | None = None,
         *,
         setup: Setup | None = None,
         controller: Any = None,
@@ -183,6 +183,7 @@ class PartProgram(Experiment):
         progress: Progress | None = None,
     ):
         words = TomlTable({}, EXPERIMENT) if experiment is None else TomlTable.open(experiment, EXPERIMENT)
+        machine = str(machine) if isinstance(machine, Path) else machine
         given = {"machine": machine, "mode": mode, "sample_period": sample_period, "controller": controller}
         for key, value in given.items():
             if value is not None and key in words.table and key not in ("mode", "controller"):

@@ -1,0 +1,81 @@
+"""What a person types in a notebook: paths as `Path`, and arguments of the wrong kind, which end in a sentence."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rds
+from rds.machines.machine import load_machine as loaded
+
+LAW = """params = {"Kp": 30.0}
+initial_state = []
+
+
+def control(t, r, y, state, params):
+    return params["Kp"] * (r.position - y), state
+"""
+STEPS = """params = {}
+
+
+def interpolate(segment, T, params):
+    k = int(abs(segment.end[0] - segment.start[0]) / (segment.feed_rate * T))
+    for i in range(1, k + 1):
+        yield [(a + (b - a) * i / k, 0.0, 0.0) for a, b in zip(segment.start, segment.end)]
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "law.py").write_text(LAW)
+    (tmp_path / "steps.py").write_text(STEPS)
+    (tmp_path / "part.ngc").write_text("G21 G90\nG1 X2 F600\nM2\n")
+    (tmp_path / "m.toml").write_text(Path(loaded("mini-cnc").path).read_text())
+    return tmp_path
+
+
+def short(**more: Any) -> rds.Experiment:
+    return rds.Experiment(reference=rds.sinusoid(5.0, 2.0), controller=Path("law.py"), duration=0.5, **more)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_path_may_name_whatever_a_text_may() -> None:
+    machine = Path("m.toml")
+    assert rds.load_machine(machine).axes == rds.load_machine("m.toml").axes
+    assert short(machine=machine).run(out=Path("a")).length == short(machine="m.toml").run(out="b").length
+    assert rds.compare(rds.open_result(Path("a")), rds.open_result("b")).identical
+    with pytest.raises(rds.InputError, match=r"a is no result; rds\.open_result opens"):
+        rds.compare("a", "b")  # type: ignore[arg-type]
+    part = rds.PartProgram(Path("part.ngc"), machine, interpolator=Path("steps.py"), controller=Path("law.py"))
+    assert part.run().meta["program"]["completed"]
+
+
+def test_the_folder_of_a_result_is_read_from_inside(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    short().run(out=here / "run")
+    monkeypatch.chdir(here / "run")
+    assert len(rds.read_log(".")[0].time) == 500
+
+
+@pytest.mark.parametrize("read", [rds.read_model, rds.design])
+def test_a_number_is_no_file_and_closes_none(read: Any) -> None:
+    """Python's open takes 1 for standard output, and closes it."""
+    ours, theirs = os.pipe()
+    try:
+        with pytest.raises(TypeError):
+            read(theirs)
+        os.fstat(theirs)
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+@pytest.mark.parametrize("given", [(5.0, 0.2), np.ones(1000), "rows.csv", 5.0])
+def test_what_is_no_reference_is_refused_with_what_is(given: Any) -> None:
+    with pytest.raises(rds.InputError, match=r"reference = .* must be a signal \(rds.sinusoid") as refused:
+        rds.Experiment(reference=given, controller="pid")
+    assert len(str(refused.value)) < 400
