@@ -25,7 +25,9 @@ STEPS = """params = {}
 def interpolate(segment, T, params):
     k = int(abs(segment.end[0] - segment.start[0]) / (segment.feed_rate * T))
     for i in range(1, k + 1):
-        yield [(a + (b - a) * i / k, 0.0, 0.0) for a, b in zip(segment.start, segment.end)]
+        at = tuple(a + (b - a) * i / k for a, b in zip(segment.start, segment.end))
+        rest = (0.0,) * len(at)
+        yield at, rest, rest
 """
 
 
@@ -59,6 +61,25 @@ def test_the_folder_of_a_result_is_read_from_inside(here: Path, monkeypatch: pyt
     short().run(out=here / "run")
     monkeypatch.chdir(here / "run")
     assert len(rds.read_log(".")[0].time) == 500
+
+
+@pytest.mark.usefixtures("here")
+def test_an_interpolator_is_named_as_everywhere() -> None:
+    line = rds.LineSegment((0.0, 0.0), (2.0, 0.0), 10.0)
+    named = rds.interpolate([line], 1e-3, "linear")
+    assert named.methods == ("linear", "linear")
+    assert (named.position == rds.interpolate(line, 1e-3, rds.interpolator("linear")).position).all()
+    own = rds.interpolate(line, 1e-3, Path("steps.py"))
+    assert own.position[-1] == pytest.approx([2.0, 0.0])
+    with pytest.raises(rds.InputError, match=r"3 is no interpolator; give a name of the library, a \.py file"):
+        rds.interpolate(line, 1e-3, 3)  # type: ignore[arg-type]
+
+
+@pytest.mark.usefixtures("here")
+def test_one_log_is_fitted_with_a_structure_by_its_name() -> None:
+    rds.Experiment(signal=rds.chirp(3.0, 0.5, 5.0, 4.0), duration=4.0).run(out="run")
+    (log,) = rds.read_log("run")
+    assert rds.fit(log, "axis").values() == rds.fit([log], rds.structure("axis")).values()
 
 
 @pytest.mark.parametrize("read", [rds.read_model, rds.design])

@@ -14,8 +14,9 @@ import numpy as np
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import ContractError, InputError
 from rds.core.geometry import length
-from rds.core.load import StudentFile, load_student
+from rds.core.load import StudentFile, from_function, load_student
 from rds.core.options import read_options
+from rds.core.quantities import shortened
 from rds.core.signature import form
 from rds.core.types import ArcSegment, Segment, Source
 from rds.interpolators import DEFAULT, LIBRARY
@@ -123,6 +124,17 @@ def find_interpolator(name: str, options: Mapping[str, Any] | None = None) -> In
     if name not in LIBRARY.modules and (name.endswith(".py") or Path(name).is_file()):
         return from_student(load_student(name), options)
     return from_library(name, options or {})
+
+
+def as_interpolator(given: Any) -> Interpolator:
+    """What a person may give for one: itself, a name of the library, the path of a .py file, or a function."""
+    if isinstance(given, Interpolator):
+        return given
+    if isinstance(given, str | Path):
+        return find_interpolator(str(given))
+    if callable(given):
+        return from_student(from_function(given))
+    raise InputError(f"{shortened(given)} is no interpolator; give a name of the library, a .py file, or a function")
 
 
 def library_interpolator(name: str = DEFAULT, **options: Any) -> Interpolator:

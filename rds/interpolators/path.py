@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import ceil
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.types import ArcSegment, Segment
+from rds.core.types import ArcSegment, LineSegment, Segment
+from rds.interpolators import DEFAULT
 from rds.interpolators.acceleration import Acceleration, smooth
 from rds.interpolators.deviation import path_distances
-from rds.interpolators.interpolator import Interpolator, from_library
+from rds.interpolators.interpolator import Interpolator, as_interpolator
 from rds.interpolators.reference_pulse import pulses
 from rds.interpolators.result import Interpolation
 from rds.interpolators.segment import checked
@@ -22,10 +25,10 @@ _GAP = 1e-6  # mm, between the end of a segment and the start of the next
 def interpolate(
     segments: Sequence[Segment],
     T: float,
-    method: Interpolator | None = None,
+    method: Interpolator | str | Path | Callable[..., Any] | None = None,
     *,
-    lines: Interpolator | None = None,
-    arcs: Interpolator | None = None,
+    lines: Interpolator | str | Path | Callable[..., Any] | None = None,
+    arcs: Interpolator | str | Path | Callable[..., Any] | None = None,
     acceleration: Acceleration | None = None,
     exact_stop: bool = False,
     axes: Sequence[str] | None = None,
@@ -33,15 +36,18 @@ def interpolate(
 ) -> Interpolation:
     """The whole path sampled every `T` s, from rest at its start.
 
-    `method` (default: constant velocity) interpolates it, `lines` and `arcs` in its stead what they are for.
+    `method` (default: constant velocity) interpolates it, `lines` and `arcs` in its stead what they are for: names of
+    the library, paths of .py files, functions, or interpolators with options of their own (`rds.interpolator`).
     `acceleration` filters the motion as one stream, so that corners are rounded; with `exact_stop` each segment by
     itself, so that the axes come to rest at its end. `axes` are their names (default X, Y, Z, A, B, C). `rests` says
     after which segments (by index; -1: before the first) the axes rest, and for how many s at least, a dwell's.
     Positions are in whole BLU where one of the methods says so. Raises InputError for segments that don't follow each
     other or that a method doesn't take, ContractError for a user's method that breaks its interface.
     """
-    base = method or from_library("constant-velocity", {})
-    pair = (lines or base, arcs or base)
+    if isinstance(segments, LineSegment | ArcSegment):
+        segments = [segments]
+    base = as_interpolator(DEFAULT if method is None else method)
+    pair = (base if lines is None else as_interpolator(lines), base if arcs is None else as_interpolator(arcs))
     names = _names(axes, segments)
     check_chain(segments, T)
     chosen = [pair[isinstance(segment, ArcSegment)] for segment in segments]

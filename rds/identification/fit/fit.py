@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import hypot
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from rds.identification.logs.log import Log
 from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import for_logs
+from rds.identification.structures.structures import structure as make_structure
 
 METHODS = Registry(  # each module has `estimate(logs, structure, options) -> Estimate`
     "method",
@@ -31,14 +33,20 @@ _OF_POSITIONS = ("step", "frequency")  # methods that take a speed of the struct
 
 
 def fit(
-    logs: Sequence[Log], structure: Structure, method: str | None = None, options: Mapping[str, Any] | None = None
+    logs: Log | Sequence[Log],
+    structure: Structure | str | Path,
+    method: str | None = None,
+    options: Mapping[str, Any] | None = None,
 ) -> Estimate:
     """The parameters of `structure` that explain the logs, all fitted together, by the method's own `options`.
 
-    InputError for an unknown method or option, no logs, or logs that hold nothing to estimate from.
+    `structure` by its name or file where its own options and units are not needed (`rds.structure`). InputError for an
+    unknown structure, method or option, no logs, or logs that hold nothing to estimate from.
     """
+    logs = [logs] if isinstance(logs, Log) else logs
     if not logs:
         raise InputError("there is no log to fit; name at least one")
+    structure = make_structure(structure) if isinstance(structure, str | Path) else structure
     named = _names_apart(logs)
     structure = for_logs(structure, named)
     if method in _OF_POSITIONS and structure.is_rate and structure.name != "spindle":

@@ -15,6 +15,7 @@ import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import ceil, log, pi, sqrt
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,7 @@ class Learned:
 
 
 def learn(
-    experiment: Experiment,
+    experiment: Experiment | str | Path,
     trials: int = 10,
     *,
     mode: str | None = None,
@@ -65,7 +66,7 @@ def learn(
     cutoff: float = 10.0,
     trial: Trial | None = None,
 ) -> Learned:
-    """Run an experiment `trials` times in `mode`, learning from each trial.
+    """Run an experiment, or the one of a file, `trials` times in `mode`, learning from each trial.
 
     Any law of single axes learns, on references that are known before the run; the laws must be stable by themselves.
     `lead` (s) makes up for the time in which the loop answers: two samples for a law with feedforward, the loop's time
@@ -79,6 +80,7 @@ def learn(
         ("cutoff", cutoff, CUTOFF),
     ):
         declared.check(value, name, "learn")
+    experiment = Experiment.from_toml(experiment) if isinstance(experiment, str | Path) else experiment
     plan = experiment.plan(mode)
     if obstacle := _obstacle(plan):
         raise InputError(f"this experiment cannot learn: {obstacle}")
