@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
 
 import can
@@ -52,6 +53,33 @@ def test_mat_vectors_structs_matrices_and_constants(tmp_path: Path) -> None:
         "left out, as they do not have 4000 values like the others: other (2)",
         "left out, as they hold no real numbers: who",
     }
+
+
+def test_vectors_beside_objects_of_matlab_classes_are_read(tmp_path: Path) -> None:
+    """A string, a transfer function or a timetable in a file of version 7 costs that variable, not the file."""
+    from scipy.io import savemat
+
+    def element(kind: int, data: bytes) -> bytes:
+        return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    def opaque(name: bytes, of_class: bytes) -> bytes:
+        inner = element(6, struct.pack("<II", 13, 0))  # a vector of uint32
+        inner += element(5, struct.pack("<ii", 2, 1)) + element(1, b"") + element(6, struct.pack("<II", 0xDD000000, 1))
+        names = element(1, name) + element(1, b"MCOS") + element(1, of_class)
+        return element(14, element(6, struct.pack("<II", 17, 0)) + names + element(14, inner))
+
+    made = axis()
+    path = tmp_path / "log.mat"
+    savemat(path, {name: made[name] for name in ("time", "voltage", "position")})
+    path.write_bytes(path.read_bytes() + opaque(b"label", b"string") + opaque(b"tt", b"timetable"))
+    (tmp_path / "log.mat.map.toml").write_text(MAP)
+    (log,) = read_log(path)
+    assert np.array_equal(log.position, made["position"])
+    left_out = [f.what for f in log.findings if f.kind == "columns"]
+    assert [what.split(",")[0] for what in left_out] == [
+        "left out label: of MATLAB's class string",
+        "left out tt: of MATLAB's class timetable",
+    ]
 
 
 def test_damaged_mat_files_are_refused(tmp_path: Path) -> None:

@@ -139,3 +139,42 @@ def test_a_column_is_named_with_its_unit_or_without(tmp_path: Path) -> None:
         assert table.column(name, "a map").name == bare
     with pytest.raises(InputError, match=r"no column 'x \[um\]'; it has t, u, x"):
         table.column("x [um]", "a map")
+
+
+SCOPE = "\n".join(
+    "\t".join(label if cell is None else cell for cell in row)
+    for label, row in {
+        "Name": (None, "ActPos", "Lag", None, "CmdVolt", None, "Slow"),
+        "SampleTime[ms]": (None, "1", "1", None, "0,5", None, "2"),
+        "Unit": (None, "mm (Length)", "(None)", None, "V (Voltage)", None, "(None)"),
+        "ScaleFactor": (None, "1", "1", None, "1", None, "-1"),
+        "Unit ScaleFactor": (None, "1", "1", None, "1", None, "1"),
+    }.items()
+)
+
+
+def test_channels_of_a_scope_end_one_after_another(tmp_path: Path) -> None:
+    """TwinCAT's own export: one column of times for several channels, cells left out behind those that have ended."""
+    rows = []
+    for k in range(800):
+        ms, pos, slow = (f"{k}", f"{X[k]:.6f}", f"{k / 2}") if k < 400 else (" ", " ", " ")
+        row = [ms, pos, ms, f"{0.5 * k}", f"{np.sin(0.015 * k):.6f}", *((f"{2 * k}", slow) if k < 200 else (" ", " "))]
+        rows.append("\t".join(row).rstrip(" \t").replace(".", ","))
+    path = tmp_path / "scope.csv"
+    path.write_text(f"Name\tProject\nFile\tC:\\a.svdx\n\n{SCOPE}\n\n" + "\n".join(rows) + "\nEOF\n", encoding="utf-8")
+    table = read_table(path)
+    assert {name: len(column.values) for name, column in table.columns.items()} == {
+        "ActPos": 400,
+        "Lag": 400,
+        "CmdVolt": 800,
+        "Slow": 200,
+    }
+    assert [(c.unit, c.time is not None and c.time[-1]) for c in table.columns.values()] == [
+        ("mm", 0.399),
+        (None, 0.399),
+        ("V", pytest.approx(0.3995)),
+        (None, pytest.approx(0.398)),
+    ]
+    assert [f.what[:5] for f in table.findings] == ["Slow:"]  # its factor may be applied or not: the file does not tell
+    (log,) = read_log(path)
+    assert np.allclose(log.position, X, atol=1e-6) and np.allclose(log.command, U, atol=1e-6)

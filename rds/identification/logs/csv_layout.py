@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rds.core.errors import InputError
-from rds.identification.logs.csv_headings import Headings, alternates, labview_units, name_and_unit, paired_headings
+from rds.identification.logs.csv_headings import Headings, alternates, labelled_headings, labview_units, name_and_unit
 from rds.identification.logs.units import dimension
 from rds.results.units import split_heading
 
@@ -39,7 +39,9 @@ class Layout:
     words: frozenset[int]  # columns whose cells are no numbers
     dates: Mapping[int, bool]  # columns of dates and times of day: whether their first one says its zone
     announced: int | None = None  # samples, where a comment says how many there should be
-    paired: bool = False  # every other column holds the times of the column after it
+    times: tuple[int, ...] = ()  # columns that hold the times of the columns after them
+    ragged: bool = False  # channels end one after another, and rows with them
+    scaled: tuple[str, ...] = ()  # channels of which nothing tells whether their numbers are scaled
 
 
 def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
@@ -63,11 +65,15 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
             remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
     _, width, mark, point, first = best
-    found_heads = paired_headings(lines[:first], lambda line: split(line, mark), width)
+    found_heads = labelled_headings(lines[:first], lambda line: split(line, mark)) if mark != " " else None
+    labelled = found_heads is not None
     if found_heads is None:
         first = _with_faulty_rows(lines, first, mark, point, width)
         found_heads = _headings(lines, first, mark, point, width)
-    names, units, paired = found_heads
+    names, units, times, scaled = found_heads
+    width = len(names)
+    if labelled:  # most rows may be shorter, as channels end one after another
+        first = _below_labels(lines, first, mark, point, width)
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
     stamps = {i: found for i in range(width) for row in body[:1] if (found := _DATE.fullmatch(row[i]))}
     dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()}
@@ -79,9 +85,9 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         and not any(is_number(row[i], point) for row in body)
         and any(row[i].lower() not in BLANKS for row in body)
     )
-    return Layout(
-        encoding, mark, point, first, names, units, words, dates, _announced(lines[:first]), paired or alternates(units)
-    )
+    times = times or (tuple(range(0, width, 2)) if alternates(units) else ())
+    announced = _announced(lines[:first])
+    return Layout(encoding, mark, point, first, names, units, words, dates, announced, times, labelled, scaled)
 
 
 def _worth_trying(lines: Sequence[str]) -> list[str]:
@@ -179,6 +185,15 @@ def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal:
         at -= 1
     heading = _heading_cells(lines[at - 1], delimiter, width) if at > 0 else None
     return at if heading is not None else first
+
+
+def _below_labels(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> int:
+    """The first whole row of numbers, at `first` or before it."""
+    for number, line in enumerate(lines[:first]):
+        cells = split(line, delimiter)
+        if len(cells) >= width and all(is_number(cell, decimal) for cell in cells if cell.lower() not in BLANKS):
+            return number
+    return first
 
 
 def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
