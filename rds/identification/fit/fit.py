@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import hypot
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,14 +32,17 @@ _OF_POSITIONS = ("step", "frequency")  # methods that take a speed of the struct
 
 
 def fit(
-    logs: Sequence[Log], structure: Structure, method: str | None = None, options: Mapping[str, Any] | None = None
+    logs: Sequence[Log] | Log, structure: Structure, method: str | None = None, options: Mapping[str, Any] | None = None
 ) -> Estimate:
     """The parameters of `structure` that explain the logs, all fitted together, by the method's own `options`.
 
     InputError for an unknown method or option, no logs, or logs that hold nothing to estimate from.
     """
+    logs = [logs] if isinstance(logs, Log | str | Path) else list(logs)
     if not logs:
         raise InputError("there is no log to fit; name at least one")
+    if (other := next((log for log in logs if not isinstance(log, Log)), None)) is not None:
+        raise InputError(f"{other!r:.60} is no log; read it first: fit(read_log(FILE), ...)")
     named = _names_apart(logs)
     structure = for_logs(structure, named)
     if method in _OF_POSITIONS and structure.is_rate and structure.name != "spindle":

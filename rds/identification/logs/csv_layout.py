@@ -24,6 +24,10 @@ COMMENTS = ("#", "%", "//", "!")
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
 BLANKS = frozenset(("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "+inf"))
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+_CLOCK = re.compile(r"\d\d:\d\d:\d\d(\.\d{1,9})?")  # a time of day
+_RIGOL = re.compile(
+    r"X,(CH\d,)+Start,Increment,?\s*"
+)  # an oscilloscope's first line; the second has units, start, step
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,9 @@ class Layout:
     announced: int | None = None  # samples, where a comment says how many there should be
     times: tuple[int, ...] = ()  # columns that hold the times of the columns after them
     ragged: bool = False  # channels end one after another, and rows with them
+    clocks: frozenset[int] = frozenset()  # which of the dates are times of day alone
+    counted: tuple[float, float] | None = None  # the first column is a number of the sample: time of the first, step
+    passed: str = ""  # a line above the data that has numbers in it, too
     scaled: tuple[str, ...] = ()  # channels of which nothing tells whether their numbers are scaled
 
 
@@ -76,7 +83,8 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         first = _below_labels(lines, first, mark, point, width)
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
     stamps = {i: found for i in range(width) for row in body[:1] if (found := _DATE.fullmatch(row[i]))}
-    dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()}
+    clocks = frozenset(i for i in range(width) for row in body[:1] if _CLOCK.fullmatch(row[i]))
+    dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()} | dict.fromkeys(clocks, False)
     words = frozenset(
         i
         for i in range(width)
@@ -87,7 +95,28 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     )
     times = times or (tuple(range(0, width, 2)) if alternates(units) else ())
     announced = _announced(lines[:first])
-    return Layout(encoding, mark, point, first, names, units, words, dates, announced, times, labelled, scaled)
+    numbers = [i for i in range(width) if any(is_number(row[i], point) for row in body[:_FEW])]
+    passed = "" if labelled else _passed(lines[:first], mark, point, width, numbers)
+    counted = None
+    if _RIGOL.fullmatch(lines[0]) and first > 1:
+        names, units, counted = _of_rigol(lines[0], lines[1], names, units)
+    return Layout(
+        encoding,
+        mark,
+        point,
+        first,
+        names,
+        units,
+        words,
+        dates,
+        announced,
+        times,
+        labelled,
+        clocks,
+        counted,
+        passed,
+        scaled,
+    )
 
 
 def _worth_trying(lines: Sequence[str]) -> list[str]:
@@ -160,7 +189,9 @@ def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int,
     for number, line in enumerate(lines):
         if line.strip() and not is_comment(line):
             cells = split(line, delimiter)
-            kinds = [is_number(cell, decimal) or bool(_DATE.fullmatch(cell)) for cell in cells]
+            kinds = [
+                is_number(cell, decimal) or bool(_DATE.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in cells
+            ]
             blanks = sum(cell.lower() in BLANKS for cell in cells)
             if any(kinds) and sum(kinds) + blanks >= len(cells) / 2:
                 fits = [kind or cell.lower() in BLANKS for kind, cell in zip(kinds, cells, strict=True)]
@@ -185,6 +216,29 @@ def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal:
         at -= 1
     heading = _heading_cells(lines[at - 1], delimiter, width) if at > 0 else None
     return at if heading is not None else first
+
+
+def _passed(above: Sequence[str], delimiter: str, decimal: str, width: int, numbers: Sequence[int]) -> str:
+    """The last line above the data that has numbers where they have, two or more; "" where none has."""
+    for line in reversed(above):
+        cells = split(line, delimiter)
+        if len(cells) == width and len(numbers) > 1 and all(is_number(cells[i], decimal) for i in numbers):
+            return line
+    return ""
+
+
+def _of_rigol(
+    head: str, below: str, names: tuple[str, ...], units: tuple[str | None, ...]
+) -> tuple[tuple[str, ...], tuple[str | None, ...], tuple[float, float] | None]:
+    """Names, units, and time of the first sample and step, of a table whose first column counts the samples."""
+    channels = [cell for cell in split(head, ",") if cell.startswith("CH")]
+    _, *own = split(below, ",")
+    try:
+        counted = float(own[len(channels)]), float(own[len(channels) + 1])
+    except (IndexError, ValueError):
+        return names, units, None
+    found = len(channels) + 1
+    return ("time", *channels, *names[found:]), ("s", *own[: len(channels)], *units[found:]), counted
 
 
 def _below_labels(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> int:
@@ -214,6 +268,8 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
     names = []
     for i, cell in enumerate(heads):
         name, unit = name_and_unit(cell.strip('"'))
+        if units[i] is not None and unit is not None and dimension(unit) is None:
+            name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
         names.append(name or f"column {i + 1}")
         units[i] = unit if unit is not None else units[i]
     of_labview = labview_units(lines[:first], lambda line: split(line, delimiter), names)

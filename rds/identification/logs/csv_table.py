@@ -25,6 +25,7 @@ _BLOCK = 1 << 22  # bytes
 _TAIL = 1 << 14  # bytes at the end in which a cut is looked for
 _REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")
 _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
+_DAY = 86400.0  # s
 _END = b"EOF"  # the last line of an export of TwinCAT's scope
 _NULLS = [" ", *BLANKS, *(word.upper() for word in BLANKS), "NaN", "Null", "None", "Inf", "+Inf", "-Inf"]
 
@@ -83,6 +84,9 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
     if remarks:
         findings.append(Finding("comments", f"{remarks} remarks between the rows were passed over"))
     rows = max(map(len, values.values()), default=0)
+    if layout.passed:
+        what = f"a line above the first row of data has numbers, too, and was passed over: {layout.passed[:80]!r}"
+        findings.append(Finding("headings", what, Gravity.WARNING))
     if layout.scaled:
         what = f"{', '.join(layout.scaled[:8])}: a factor or an offset stands in the head of the file, which does not "
         what += "tell whether it is applied; compare the values with what was displayed, and give scale in a map if not"
@@ -97,6 +101,9 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
         elif not (at and at == len(names) - 1 and name == f"column {at + 1}" and np.isnan(values[at]).all()):
             # but for what a delimiter at the end of each line makes
             columns[name] = Column(name, "s" if at in layout.dates else unit, values[at])
+    if layout.counted is not None:
+        begin, step = layout.counted
+        columns["time"] = replace(columns["time"], values=begin + step * columns["time"].values)
     if layout.times:
         columns = _with_own_times(columns, layout.times)
     return Table(path, "csv", columns, findings=tuple(findings))
@@ -151,6 +158,7 @@ def _read(
     types = {key: pa.string() if int(key) in words else pa.float64() for key in keys}
     dates = {i: zone for i, zone in layout.dates.items() if i not in words}
     types |= {str(i): pa.timestamp("ns", tz="UTC" if zone else None) for i, zone in dates.items()}
+    types |= {str(i): pa.time64("ns") for i in layout.clocks if i in dates}
 
     refused: list[Any] = []
 
@@ -196,6 +204,8 @@ def _read(
     for i in list(values):
         column = np.concatenate(values.pop(i) or [np.empty(0, dtype="datetime64[ns]" if i in dates else np.float64)])
         joined[i] = since_first(column) if i in dates else column
+        if i in layout.clocks:
+            joined[i] = _through_midnight(joined[i])
     return joined, {i: texts.get(i, (0, "")) for i in words}, stream.remarks
 
 
@@ -275,13 +285,22 @@ def _numbers(cells: Any) -> np.ndarray:
     """
     import pyarrow as pa
 
-    dates = pa.types.is_timestamp(cells.type)
+    dates = pa.types.is_timestamp(cells.type) or pa.types.is_time(cells.type)
     numbers = cells.view(pa.int64()) if dates else cells
     if numbers.null_count:
         numbers = numbers.fill_null(np.iinfo(np.int64).min if dates else np.nan)  # the first is NumPy's "no date"
     kind = np.int64 if dates else np.float64
     found = np.frombuffer(numbers.buffers()[1], kind, len(numbers), numbers.offset * np.dtype(kind).itemsize)
     return found.view("datetime64[ns]") if dates else found
+
+
+def _through_midnight(seconds: np.ndarray) -> np.ndarray:
+    """Times of day that go on where a day begins."""
+    there = np.flatnonzero(np.isfinite(seconds))
+    days = np.cumsum(np.diff(seconds[there], prepend=0.0) < -0.5 * _DAY)
+    gone_on = seconds.copy()
+    gone_on[there] += _DAY * days
+    return gone_on
 
 
 def _first_word(cells: Sequence[str | None], decimal: str) -> tuple[int, str] | None:
