@@ -204,6 +204,12 @@ def test_a_drive_without_a_list_of_modes_is_asked_by_choosing(served: Served, tm
     assert nodes[0].drive.objects[0x6060] == 0  # as it was
 
 
+def test_an_xdd_is_told_as_xml(tmp_path: Path) -> None:
+    (tmp_path / "drive.xdd").write_text('\ufeff<?xml version="1.0" encoding="utf-8"?>\n<ISO15745ProfileContainer/>\n')
+    with pytest.raises(InputError, match=r"it is XML .* export one from it"):
+        read_eds(tmp_path / "drive.xdd", 2)
+
+
 def test_only_drives_have_an_eds(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["machine", "serve", "mini-cnc", "--eds", str(tmp_path / "x.eds")])
     assert done.exit_code == 2 and "only simulated drives" in done.output
