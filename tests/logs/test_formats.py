@@ -17,6 +17,7 @@ from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.identification.logs.describe import describe
 from rds.identification.logs.read_log import read_log
+from rds.identification.logs.tables import read_table
 from rds.results import Result
 from tests.logs.data_files import MAP, axis, headed, write
 
@@ -53,6 +54,23 @@ def test_mat_vectors_structs_matrices_and_constants(tmp_path: Path) -> None:
         "left out, as they do not have 4000 values like the others: other (2)",
         "left out, as they hold no real numbers: who",
     }
+
+
+@pytest.mark.parametrize(("labels", "names"), [(("u", "x"), ("u", "x")), (("", ""), ("1", "2"))])
+def test_the_signals_of_a_scope_are_columns(labels: tuple[str, str], names: tuple[str, str], tmp_path: Path) -> None:
+    """Simulink's "structure with time": the ports of a scope are an array of structs."""
+    from scipy.io import savemat
+
+    made = axis()
+    signals = np.empty((1, 2), dtype=[("values", object), ("label", object)])
+    for at, (label, values) in enumerate(zip(labels, (made["voltage"], made["position"]), strict=True)):
+        signals[0, at] = (values[:, None], label)
+    savemat(tmp_path / "log.mat", {"scope": {"time": made["time"][:, None], "signals": signals}})
+    columns = read_table(tmp_path / "log.mat").columns
+    joint = "." if labels[0] else "_"
+    assert np.array_equal(columns["scope.time"].values, made["time"])
+    for name, values in zip(names, (made["voltage"], made["position"]), strict=True):
+        assert np.array_equal(columns[f"scope.signals{joint}{name}.values"].values, values)
 
 
 def test_vectors_beside_objects_of_matlab_classes_are_read(tmp_path: Path) -> None:

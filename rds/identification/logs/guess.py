@@ -199,8 +199,8 @@ def _why_no_time(column: Column) -> str:
     if len(steps) and steps.min() == 0.0 and steps.max() > 0.0:
         return (
             f"{column.name!r} stays the same in {int(np.sum(steps == 0.0))} of {rows} rows: its stamps are coarser "
-            "than the sample period; export it with more digits, or, if the rows are equally spaced in time, say so in a "
-            "map: rate = 1000.0 (Hz) under [time] in place of the column"
+            "than the sample period; export it with more digits, or, if the rows are equally spaced in time, say so in "
+            "a map: rate = 1000.0 (Hz) under [time] in place of the column"
         )
     return f"{column.name!r} does not increase from row to row ({rows} rows)"
 
