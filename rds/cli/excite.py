@@ -93,7 +93,7 @@ def _task(machine: Machine, axis: str, model: Path | None, duration: float, nois
                 f"axis {axis} has no [axis.{axis}.model] to design for; say what is assumed with --model FILE.toml",
                 machine.path,
             )
-        made = structure(known[name])
+        made = structure(known[name], (), machine.axis(axis).unit)
         values = {parameter: float(table.get(parameter, 0.0)) for parameter in made.parameters}
     return make_task(machine, axis, made, values, duration, noise)
 

@@ -20,7 +20,7 @@ _HEAD = struct.Struct("<116s8xH2s")
 _TAG = struct.Struct("<II")
 _VERSION, _LITTLE = 0x0100, b"IM"
 _INT8, _INT32, _UINT32, _DOUBLE, _INT64, _MATRIX, _COMPRESSED, _UTF8 = 1, 5, 6, 9, 12, 14, 15, 16
-_CHAR, _REAL, _IS_COMPLEX = 4, range(6, 16), 0x08  # classes; a flag
+_CHAR, _REAL, _OPAQUE, _IS_COMPLEX = 4, range(6, 16), 17, 0x08  # classes; a flag
 _CLASSES = {"f": (6, _DOUBLE, "<f8"), "i": (14, _INT64, "<i8")}
 _NUMBERS = {
     1: "<i1",
@@ -79,6 +79,24 @@ def shapes(path: Path) -> list[tuple[int, ...]]:
     return [found.shape for found in _variables(path.read_bytes(), _ENOUGH)]
 
 
+def objects(path: Path) -> dict[str, str]:
+    """The variables that are objects of a class (a timetable, a string, a transfer function), with their class.
+
+    MATLAB saves them as "opaque": name, kind of object and class stand where other variables have their shape.
+    """
+    found = {}
+    try:
+        for body in _bodies(path.read_bytes(), _ENOUGH):
+            _, flags, rest = _split(body)
+            if flags[0] == _OPAQUE:
+                _, name, rest = _split(rest)
+                _, _, rest = _split(rest)
+                found[bytes(name).decode("ascii", "replace")] = bytes(_split(rest)[1]).decode("ascii", "replace")
+    except (struct.error, zlib.error, ValueError, IndexError, OtherFileError):
+        pass  # of another computer, or damaged: who reads its numbers says so
+    return found
+
+
 class _Variable(NamedTuple):
     name: str
     of_class: int
@@ -89,27 +107,32 @@ class _Variable(NamedTuple):
 def _variables(file: bytes, most: int = 0) -> Iterator[_Variable]:
     """What is in a file; with `most`, only as many bytes are unpacked of each."""
     try:
-        _, version, order = _HEAD.unpack_from(file)
-        if (version, order) != (_VERSION, _LITTLE):
-            raise OtherFileError("no MAT file of version 5 in the order of bytes of today's computers")
-        rest = memoryview(file)[_HEAD.size :]
-        while rest:
-            kind, length = _TAG.unpack_from(rest)
-            body = rest[_TAG.size : _TAG.size + length]
-            if len(body) < length:
-                raise OtherFileError("it is cut")
-            rest = rest[_TAG.size + length :]
-            if kind == _COMPRESSED:
-                unpacking = zlib.decompressobj()
-                whole = memoryview(unpacking.decompress(body, most))
-                if not most and not unpacking.eof:
-                    raise OtherFileError("it is cut")
-                kind, body = _TAG.unpack_from(whole)[0], whole[_TAG.size :]
-            if kind != _MATRIX:
-                raise OtherFileError(f"an element of type {kind}")
+        for body in _bodies(file, most):
             yield _variable(body)
     except (struct.error, zlib.error, ValueError, IndexError) as error:
         raise OtherFileError(str(error)) from error
+
+
+def _bodies(file: bytes, most: int) -> Iterator[memoryview]:
+    _, version, order = _HEAD.unpack_from(file)
+    if (version, order) != (_VERSION, _LITTLE):
+        raise OtherFileError("no MAT file of version 5 in the order of bytes of today's computers")
+    rest = memoryview(file)[_HEAD.size :]
+    while rest:
+        kind, length = _TAG.unpack_from(rest)
+        body = rest[_TAG.size : _TAG.size + length]
+        if len(body) < length:
+            raise OtherFileError("it is cut")
+        rest = rest[_TAG.size + length :]
+        if kind == _COMPRESSED:
+            unpacking = zlib.decompressobj()
+            whole = memoryview(unpacking.decompress(body, most))
+            if not most and not unpacking.eof:
+                raise OtherFileError("it is cut")
+            kind, body = _TAG.unpack_from(whole)[0], whole[_TAG.size :]
+        if kind != _MATRIX:
+            raise OtherFileError(f"an element of type {kind}")
+        yield body
 
 
 def _variable(body: memoryview) -> _Variable:

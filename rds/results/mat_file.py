@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 import struct
+import warnings
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -88,8 +89,9 @@ def confined(read: Callable[[Path], Found], path: Path) -> Found:
         with _mat_errors(), _needed():
             from scipy.io import whosmat
 
-            kinds = whosmat(path, appendmat=False)
-        claimed, plain = [shape for _, shape, _ in kinds], {kind for _, _, kind in kinds} <= _FLAT
+            objects = mat5.objects(path)  # scipy's list stumbles over them; the process apart has a limit of its own
+            kinds = [] if objects else whosmat(path, appendmat=False)
+        claimed, plain = [shape for _, shape, _ in kinds], not objects and {kind for _, _, kind in kinds} <= _FLAT
     allow_unpacked(8 * sum(prod(max(int(n), 0) for n in shape) for shape in claimed), packed)
     if plain:
         return read(path)
@@ -119,7 +121,10 @@ def read_here(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any] | None]
 
 
 def variables(path: Path) -> dict[str, Any]:
-    """All variables of a MAT file up to version 7.2, as scipy gives them; InputError for any other file."""
+    """All variables of a MAT file up to version 7.2, as scipy gives them, but objects of a class (`mat5.objects`).
+
+    InputError for any other file.
+    """
     try:
         return dict(mat5.read(path))
     except mat5.OtherFileError:
@@ -127,8 +132,12 @@ def variables(path: Path) -> dict[str, Any]:
     with _needed():
         from scipy.io import loadmat
 
-    with _mat_errors():
-        return dict(loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True))
+    with _mat_errors(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that objects of a class have no name for scipy
+        found = dict(loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True))
+    if mat5.objects(path):
+        found.pop("None", None)
+    return found
 
 
 @contextmanager

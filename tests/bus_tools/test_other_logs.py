@@ -42,6 +42,10 @@ Logging Started: 6/3/2016 13:24:56
 6224;RX;0x0000021A;8;0xFE;0x36;0x12;0xFE;0x69;0x05;0x07;0xAD;
 6225.5;TX;0x18FEF1FE;2;0x01;0xFF;;;;;;;
 """
+CANDUMP = """ (1436509052.249713)  can0  RX - -  21A   [8]  FE 36 12 FE 69 05 07 AD
+ (1436509052.251213)  can0  TX - -  18FEF1FE   [2]  01 FF
+ (1436509052.300000)  can0  RX - -  20000004   [8]  00 04 00 00 00 00 00 00   ERRORFRAME
+"""
 FIRST = (0x21A, False, bytes.fromhex("FE3612FE690507AD"), True)
 SECOND = (0x18FEF1FE, True, b"\x01\xff", False)
 
@@ -54,6 +58,8 @@ SECOND = (0x18FEF1FE, True, b"\x01\xff", False)
         ("c.txt", CRTD, 2, 0),
         ("c.crtd", CRTD, 2, 0),
         ("d.can", MICROCHIP, 6, 0),
+        ("e.log", CANDUMP, 1, 0),
+        ("e.txt", CANDUMP, 1, 0),
     ],
 )
 def test_frames_are_what_the_tool_wrote(name: str, text: str, skipped: int, impossible: int, tmp_path: Path) -> None:
@@ -78,6 +84,7 @@ def test_the_older_form_of_gvret_has_no_direction(tmp_path: Path) -> None:
         ("a.csv", GVRET + "5,0000021A,false,Rx,0,2,FE\n", 5),
         ("a.log", BUSMASTER + "10:18:59:2065 Tx 1 0x18FEF1FE x 2 01\n", 13),
         ("a.txt", CRTD + "1320745425.0 R11 XYZ FF", 5),
+        ("a.log", CANDUMP + " (1436509052.400000)  can0  21A   [8]  FE 36\n", 4),
         ("a.can", MICROCHIP + "6226;RX;0x21A;2;0x01;\n", 9),
     ],
 )
@@ -92,3 +99,13 @@ def test_a_text_that_is_no_log_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("Dear diary\n")
     with pytest.raises(InputError, match="no log of CRTD"):
         list(LogFile(tmp_path / "a.txt"))
+
+
+def test_what_candump_shows_without_directions(tmp_path: Path) -> None:
+    shown = " (1.5)  vcan0  123   [2]  01 02\n (1.6)  vcan0  7DF   [0]  remote request\n"
+    (tmp_path / "a.log").write_text(shown)
+    frames = list(LogFile(tmp_path / "a.log"))
+    assert [(m.arbitration_id, bytes(m.data), m.is_remote_frame) for m in frames] == [
+        (0x123, b"\x01\x02", False),
+        (0x7DF, b"", True),
+    ]

@@ -173,8 +173,11 @@ def test_what_is_no_dbc_file_is_refused(tmp_path: Path) -> None:
         decoder([tmp_path / "long.dbc"])
     assert len(str(refused.value)) < 1000
     (tmp_path / "bad.dbc").write_text("rubbish")
-    with pytest.raises(InputError, match="can't be read as a DBC"):
+    with pytest.raises(InputError, match=r"can't be read as a DBC file: .*correct that place, or remove it"):
         decoder([tmp_path / "bad.dbc"])
+    (tmp_path / "car.dbc").write_text('VERSION ""\nBU_:\nBO_ 274726912 Door: 8 Vector__XXX\n')
+    with pytest.raises(InputError, match=r"more than 11 bits in message Door.*add 2147483648 \(2\^31\) to the number"):
+        decoder([tmp_path / "car.dbc"])
 
 
 def test_without_cantools_it_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

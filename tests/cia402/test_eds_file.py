@@ -9,6 +9,7 @@ from pathlib import Path
 
 import canopen
 import pytest
+from canopen.sdo import SdoAbortedError
 from typer.testing import CliRunner
 
 from rds.bus.modules.cia402.commissioned import Choices, experiment_text
@@ -177,6 +178,36 @@ def test_a_drive_of_another_eds_has_what_that_says(served: Served, machine: Mach
     with opened(channel) as bus, library(bus) as network:
         prepare(network, settings, 0.01)  # 0x6084, which it lacks, is optional
     assert nodes[0].drive.objects[0x6060] == 1
+
+
+@pytest.mark.parametrize("cyclic", [True, False])
+def test_a_drive_without_a_list_of_modes_is_asked_by_choosing(served: Served, tmp_path: Path, cyclic: bool) -> None:
+    """0x6502 is optional, and so is torque: a positioning drive need have neither the cyclic modes nor 0x6071."""
+    other = tmp_path / "bare.eds"
+    text = files("rds.bus.modules.cia402").joinpath("axis.eds").read_text()
+    other.write_text(without(text, "6071", "6502"))
+    channel, nodes = served("X", eds=other)
+    writers = nodes[0].drive.objects.writers
+    choose = writers[0x6060, 0]
+
+    def chosen(value: int) -> None:
+        if value in (9, 10) or (value == 8 and not cyclic):
+            raise SdoAbortedError(0x06090030)
+        choose(value)
+
+    writers[0x6060, 0] = chosen
+    operator = Operator(refused="switch the power on")
+    with opened(channel) as bus, pytest.raises(Declined):
+        commission(bus, CommissioningOptions(node=2, period=0.01, eds=other), "bench", operator, tmp_path)
+    assert any(said.startswith("mode csp" if cyclic else "mode pp") for said in operator.said)
+    assert "by its position loop" in operator.said[-1]
+    assert nodes[0].drive.objects[0x6060] == 0  # as it was
+
+
+def test_an_xdd_is_told_as_xml(tmp_path: Path) -> None:
+    (tmp_path / "drive.xdd").write_text('\ufeff<?xml version="1.0" encoding="utf-8"?>\n<ISO15745ProfileContainer/>\n')
+    with pytest.raises(InputError, match=r"it is XML .* export one from it"):
+        read_eds(tmp_path / "drive.xdd", 2)
 
 
 def test_only_drives_have_an_eds(tmp_path: Path) -> None:

@@ -260,3 +260,21 @@ def test_a_log_of_a_speed_is_fitted_with_friction_of_each_direction_and_refused_
         fit([log], structure("axis"), "step")
     with pytest.raises(InputError, match="play shows in a position"):
         fit([log], structure("axis", ("backlash",)))
+
+
+@pytest.mark.parametrize("output", ["deg", "rev/min"])
+def test_the_right_inertia_is_valid_on_another_log(output: str) -> None:
+    """The library's axis is in deg/s, a log of a speed in rev/min: the gain of a right model was 500 % too high."""
+    found = fit(turning(1, output), structure("axis-inertia"), "simulation")
+    validation = validate(found, turning(2, output))
+    assert validation.verdict.ok
+    gain = next(reason.what for reason in validation.verdict.reasons if "its gain" in reason.what)
+    assert float(gain.split("its gain is ")[1].split()[0]) < 3.0
+
+
+def test_inverse_dynamics_of_a_held_torque_is_not_biased() -> None:
+    """A torque is held from its sample to the next: taken as it is at its sample, parameters are five errors off."""
+    found = fit(turning(1, "rev/min"), structure("axis-inertia"), "inverse-dynamics").parameters
+    for name, value in TURNS.items():
+        error = abs(found[name].value - value)
+        assert error < max(4.0 * found[name].std_error, 1e-3 * value), (name, found[name])

@@ -158,3 +158,13 @@ def test_the_command_refuses_on_stderr(
 def test_the_picture_names_its_units(found: Design) -> None:
     labels = [axes.get_ylabel() for axes in excitation_picture(found).axes]
     assert labels == ["command [V]", "X position [mm]", "predicted standard error [%]"]
+
+
+def test_an_axis_that_turns_is_designed_for_in_degrees() -> None:
+    answer = CliRunner().invoke(app, ["excite", "mrm-lathe", "--axis", "C", "--duration", "4", "--kind", "sinusoid"])
+    assert answer.exit_code == 0, answer.output
+    text = " ".join(answer.output.split())
+    assert "(deg/s)/V" in text and "mm/s" not in text
+    turns = structure("axis", (), "deg")
+    with pytest.raises(InputError, match="the model is of an axis in deg, and axis X of the machine is in mm"):
+        make_task(load_machine("mini-cnc"), "X", turns, {"tau": 0.01, "K": 1.0}, 4.0)

@@ -177,3 +177,5 @@ def test_the_picture_shows_measurement_model_and_coherence() -> None:
         "coherence",
     ]
     assert picture.png().startswith(b"\x89PNG")
+    turned = bode_picture(response, unit="(deg/s)/A")
+    assert turned.axes[0].get_ylabel() == "velocity over command [(deg/s)/A]"

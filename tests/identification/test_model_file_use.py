@@ -13,7 +13,13 @@ import rds
 from rds.checks import check_file
 from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.identification.fit.design import design_tracking, linear_axis_of, tracking_system, write_tracking
+from rds.identification.fit.design import (
+    design_tracking,
+    linear_axis_of,
+    linear_axis_of_machine,
+    tracking_system,
+    write_tracking,
+)
 from rds.identification.fit.machine_file import write_machine
 from rds.machines import load_machine
 from tests.identification.model_files import X, write_made
@@ -51,6 +57,12 @@ def test_periods_poles_and_limits_are_taken(tmp_path: Path) -> None:
     assert made.params["g1"] == pytest.approx(2000.0) and made.params["coefficients"][-1] == 5.0
     text = write_tracking(tmp_path / "own.py", model, sample_period=0.002, voltage_range=5.0).read_text()
     assert "sampled every 0.002 s" in text and '"limit": 5.0' in text
+
+
+def test_a_law_for_an_axis_that_turns_is_in_degrees(tmp_path: Path) -> None:
+    axis = linear_axis_of_machine(load_machine("mrm-lathe"), "C")
+    text = write_tracking(tmp_path / "own.py", axis).read_text()
+    assert "(deg/s)/V" in text and "mm" not in text
 
 
 def test_viscous_friction_is_part_of_the_design_and_the_rest_is_named(tmp_path: Path) -> None:

@@ -8,8 +8,10 @@ from pathlib import Path
 import can
 import pytest
 
+from rds.bus.modules.rds.frames import COMMAND
 from rds.core.errors import InputError
-from rds.identification.logs.log import Log
+from rds.identification.logs.describe import describe
+from rds.identification.logs.log import Gravity, Log
 from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis
 from tests.logs.test_formats import DBC
@@ -89,3 +91,54 @@ def test_a_log_that_ends_in_a_line_is_cut(tmp_path: Path) -> None:
 def test_a_log_without_frames_says_so(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="it holds no frames"):
         logged(tmp_path, [])
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "line"),
+    [
+        (
+            "savvy.csv",
+            "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8",
+            "{us},{id:08X},false,Rx,0,8,{bytes},",
+        ),
+        ("old.csv", "Time Stamp,ID,Extended,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8", "{us},{id:08X},false,0,8,{bytes},"),
+        ("microchip.can", "//---------------------------------", "{ms};RX;{id:#x};8;{semicolons};;;;;;;;;"),
+    ],
+)
+def test_logs_of_other_tools_become_columns(name: str, head: str, line: str, tmp_path: Path) -> None:
+    lines = [head]
+    for t, identifier, data in frames():
+        cells = [f"{byte:02X}" for byte in data]
+        lines.append(
+            line.format(
+                us=round(t * 1e6), ms=f"{t * 1e3:.3f}", id=identifier, bytes=",".join(cells), semicolons=";".join(cells)
+            )
+        )
+    (tmp_path / name).write_text("\n".join(lines) + "\n")
+    (tmp_path / "a.dbc").write_text(DBC)
+    (tmp_path / f"{name}.map.toml").write_text(MAP.replace('["a.dbc", "b.dbc"]', '"a.dbc"'))
+    (log,) = read_log(tmp_path / name)
+    made = axis(200)
+    assert len(log) == 200 and abs(log.position - made["position"]).max() < 6e-4
+
+
+def test_frames_that_are_read_as_our_own_are_said_to_be(tmp_path: Path) -> None:
+    """Another bus may use the identifiers of our modules for something else: a car's log is no log of voltages."""
+
+    def said(sent: list[tuple[int, bytes]]) -> tuple[Gravity, str]:
+        with can.CanutilsLogWriter(tmp_path / "car.log") as writer:
+            for k, (identifier, data) in enumerate(sent):
+                writer(can.Message(timestamp=1e3 + k, arbitration_id=identifier, data=data, is_extended_id=False))
+        findings = describe(tmp_path / "car.log").findings
+        return next((f.gravity, f.what) for f in findings if "no DBC file is given" in f.what)
+
+    voltages = (COMMAND, bytes(8))
+    gravity, what = said([voltages] * 3)
+    assert gravity is Gravity.NOTE and "RDS's own modules (command)" in what and 'dbc = "axes.dbc"' in what
+    assert said([voltages, (0x7F3, bytes(8)), voltages])[0] is Gravity.WARNING
+
+
+def test_a_log_of_frames_that_no_bus_could_carry_is_told_as_that(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("Time Stamp,ID,Extended,Bus,LEN,D1\n1000,00000900,false,0,1,FE,\n")
+    with pytest.raises(InputError, match="no bus could carry any of its 1 frames"):
+        read_log(tmp_path / "a.csv")

@@ -61,3 +61,19 @@ def test_a_missing_date_is_a_blank_and_one_out_of_reach_is_refused(tmp_path: Pat
     pd.DataFrame(made | {"time": far}).to_parquet(tmp_path / "log.parquet")
     with pytest.raises(InputError, match="its dates cannot be read"):
         read_log(tmp_path / "log.parquet")
+
+
+def test_times_of_day_go_on_through_midnight(tmp_path: Path) -> None:
+    made = axis(300)
+    rows = [
+        f"{str(at)[11:23]},{u:g},{y:.9g}"
+        for at, u, y in zip(
+            np.datetime64("2024-05-01T23:59:59.900", "ns") + np.arange(300) * np.timedelta64(1, "ms"),
+            made["voltage"],
+            made["position"],
+            strict=True,
+        )
+    ]
+    (tmp_path / "log.csv").write_text("\n".join(["time,voltage [V],position [mm]", *rows]) + "\n")
+    (log,) = read_log(tmp_path / "log.csv")
+    assert np.allclose(log.time, made["time"], atol=1e-9, rtol=0.0)

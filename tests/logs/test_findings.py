@@ -240,8 +240,9 @@ def test_headed_and_mapped_logs_agree(tmp_path: Path) -> None:
 
 
 def rows(time: str, command: str, position: str, count: int = 200) -> str:
-    """A table by a format of each cell; `i` is the row."""
-    body = "".join(f"{time},{command},{position}\n".format(i=i, j=i % 7, k=i % 3) for i in range(count))
+    """A table by a format of each cell; `i` is the row, `m` counts down, `c` is the row without its last digit."""
+    line = f"{time},{command},{position}\n"
+    body = "".join(line.format(i=i, j=i % 7, k=i % 3, m=count - i, c=i // 10) for i in range(count))
     return "time [s],u [V],y [mm]\n" + body
 
 
@@ -250,6 +251,11 @@ def rows(time: str, command: str, position: str, count: int = 200) -> str:
     [
         (rows("{i}", "{j}", "{k}", 0), "no lines of numbers"),
         (rows("{i}", "{j}", "{k}", 1), r"'time' does not increase from row to row \(1 rows\)"),
+        (rows("{m}", "{j}", "{k}"), r"'time' goes down from row to row; sort the rows by it, the oldest first"),
+        (
+            rows("{c}", "{j}", "{k}"),
+            r"'time' stays the same in 180 of 200 rows: .* rate = 1000\.0 \(Hz\) under \[time\]",
+        ),
         (rows("1", "{j}", "{k}"), r"'time' does not increase from row to row \(200 rows\)"),
         (rows("{i}", "{j}", "nan"), "position has no number in 200 of 200 samples"),
         (rows("{i}", "{j}", "inf"), "position has no number in 200 of 200 samples"),

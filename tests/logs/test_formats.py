@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
 
 import can
@@ -16,6 +17,7 @@ from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.identification.logs.describe import describe
 from rds.identification.logs.read_log import read_log
+from rds.identification.logs.tables import read_table
 from rds.results import Result
 from tests.logs.data_files import MAP, axis, headed, write
 
@@ -52,6 +54,50 @@ def test_mat_vectors_structs_matrices_and_constants(tmp_path: Path) -> None:
         "left out, as they do not have 4000 values like the others: other (2)",
         "left out, as they hold no real numbers: who",
     }
+
+
+@pytest.mark.parametrize(("labels", "names"), [(("u", "x"), ("u", "x")), (("", ""), ("1", "2"))])
+def test_the_signals_of_a_scope_are_columns(labels: tuple[str, str], names: tuple[str, str], tmp_path: Path) -> None:
+    """Simulink's "structure with time": the ports of a scope are an array of structs."""
+    from scipy.io import savemat
+
+    made = axis()
+    signals = np.empty((1, 2), dtype=[("values", object), ("label", object)])
+    for at, (label, values) in enumerate(zip(labels, (made["voltage"], made["position"]), strict=True)):
+        signals[0, at] = (values[:, None], label)
+    savemat(tmp_path / "log.mat", {"scope": {"time": made["time"][:, None], "signals": signals}})
+    columns = read_table(tmp_path / "log.mat").columns
+    joint = "." if labels[0] else "_"
+    assert np.array_equal(columns["scope.time"].values, made["time"])
+    for name, values in zip(names, (made["voltage"], made["position"]), strict=True):
+        assert np.array_equal(columns[f"scope.signals{joint}{name}.values"].values, values)
+
+
+def test_vectors_beside_objects_of_matlab_classes_are_read(tmp_path: Path) -> None:
+    """A string, a transfer function or a timetable in a file of version 7 costs that variable, not the file."""
+    from scipy.io import savemat
+
+    def element(kind: int, data: bytes) -> bytes:
+        return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    def opaque(name: bytes, of_class: bytes) -> bytes:
+        inner = element(6, struct.pack("<II", 13, 0))  # a vector of uint32
+        inner += element(5, struct.pack("<ii", 2, 1)) + element(1, b"") + element(6, struct.pack("<II", 0xDD000000, 1))
+        names = element(1, name) + element(1, b"MCOS") + element(1, of_class)
+        return element(14, element(6, struct.pack("<II", 17, 0)) + names + element(14, inner))
+
+    made = axis()
+    path = tmp_path / "log.mat"
+    savemat(path, {name: made[name] for name in ("time", "voltage", "position")})
+    path.write_bytes(path.read_bytes() + opaque(b"label", b"string") + opaque(b"tt", b"timetable"))
+    (tmp_path / "log.mat.map.toml").write_text(MAP)
+    (log,) = read_log(path)
+    assert np.array_equal(log.position, made["position"])
+    left_out = [f.what for f in log.findings if f.kind == "columns"]
+    assert [what.split(",")[0] for what in left_out] == [
+        "left out label: of MATLAB's class string",
+        "left out tt: of MATLAB's class timetable",
+    ]
 
 
 def test_damaged_mat_files_are_refused(tmp_path: Path) -> None:

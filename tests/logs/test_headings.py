@@ -12,7 +12,7 @@ from rds.core.errors import InputError
 from rds.identification.logs.csv_headings import name_and_unit
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.tables import read_table
-from rds.identification.logs.units import unit_of_name
+from rds.identification.logs.units import dimension, unit_of_name
 
 T = np.arange(400)  # ms
 U, X = np.sin(0.03 * T), 3.0 * np.cos(0.03 * T)
@@ -139,3 +139,75 @@ def test_a_column_is_named_with_its_unit_or_without(tmp_path: Path) -> None:
         assert table.column(name, "a map").name == bare
     with pytest.raises(InputError, match=r"no column 'x \[um\]'; it has t, u, x"):
         table.column("x [um]", "a map")
+
+
+SCOPE = "\n".join(
+    "\t".join(label if cell is None else cell for cell in row)
+    for label, row in {
+        "Name": (None, "ActPos", "Lag", None, "CmdVolt", None, "Slow"),
+        "SampleTime[ms]": (None, "1", "1", None, "0,5", None, "2"),
+        "Unit": (None, "mm (Length)", "(None)", None, "V (Voltage)", None, "(None)"),
+        "ScaleFactor": (None, "1", "1", None, "1", None, "-1"),
+        "Unit ScaleFactor": (None, "1", "1", None, "1", None, "1"),
+    }.items()
+)
+
+
+def test_channels_of_a_scope_end_one_after_another(tmp_path: Path) -> None:
+    """TwinCAT's own export: one column of times for several channels, cells left out behind those that have ended."""
+    rows = []
+    for k in range(800):
+        ms, pos, slow = (f"{k}", f"{X[k]:.6f}", f"{k / 2}") if k < 400 else (" ", " ", " ")
+        row = [ms, pos, ms, f"{0.5 * k}", f"{np.sin(0.015 * k):.6f}", *((f"{2 * k}", slow) if k < 200 else (" ", " "))]
+        rows.append("\t".join(row).rstrip(" \t").replace(".", ","))
+    path = tmp_path / "scope.csv"
+    path.write_text(f"Name\tProject\nFile\tC:\\a.svdx\n\n{SCOPE}\n\n" + "\n".join(rows) + "\nEOF\n", encoding="utf-8")
+    table = read_table(path)
+    assert {name: len(column.values) for name, column in table.columns.items()} == {
+        "ActPos": 400,
+        "Lag": 400,
+        "CmdVolt": 800,
+        "Slow": 200,
+    }
+    assert [(c.unit, c.time is not None and c.time[-1]) for c in table.columns.values()] == [
+        ("mm", 0.399),
+        (None, 0.399),
+        ("V", pytest.approx(0.3995)),
+        (None, pytest.approx(0.398)),
+    ]
+    assert [f.what[:5] for f in table.findings] == ["Slow:"]  # its factor may be applied or not: the file does not tell
+    (log,) = read_log(path)
+    assert np.allclose(log.position, X, atol=1e-6) and np.allclose(log.command, U, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "begin"),
+    [
+        ("X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-2.0e-01,1.0e-03\n", "{k},{u},{x},", -0.2),
+        ("Time,X(CH1),X(CH2)\nSecond,Volt,Volt\n", "{t},{u},{x}", 0.0),
+        ("Record Length,Analog:400\nSource,CH1,CH2\nSecond,Volt,Volt\n", "{t},{u},{x}", 0.0),
+    ],
+)
+def test_oscilloscopes_head_their_times_and_units(head: str, rows: str, begin: float, tmp_path: Path) -> None:
+    lines = [rows.format(k=k, t=f"{k * 1e-3:.6e}", u=f"{U[k]:.4f}", x=f"{X[k]:.4f}") for k in range(400)]
+    (tmp_path / "scope.csv").write_text(head + "\n".join(lines) + "\n")
+    time, first, second = read_table(tmp_path / "scope.csv").columns.values()
+    assert np.allclose(time.values, begin + T / 1e3) and dimension(str(time.unit)) == "time"
+    assert np.allclose(first.values, U, atol=1e-4) and np.allclose(second.values, X, atol=1e-4)
+    assert dimension(str(first.unit)) == dimension(str(second.unit)) == "voltage" and "CH2" in second.name
+
+
+def test_rows_that_are_taken_for_the_head_are_told(tmp_path: Path) -> None:
+    """An oscilloscope with its settings beside the samples: those beside numbers are not lost without a word."""
+    settings = ["Record Length,400", "Sample Interval,1e-3", "Source,CH1", *[","] * 397]
+    rows = [f"{left},{t / 1e3:.6f},{x:.4f}" for left, t, x in zip(settings, T, X, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(rows) + "\n")
+    table = read_table(tmp_path / "a.csv")
+    kept = len(next(iter(table.columns.values())).values)
+    told = [f.what for f in table.findings if f.kind == "headings" and "was passed over" in f.what]
+    assert kept == 400 or told
+
+
+def test_a_preamble_with_numbers_is_no_lost_row(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("Attenuation,10,10\nt [s],u [V],x [mm]\n" + "0.1,2,3\n0.2,3,4\n" * 3)
+    assert not read_table(tmp_path / "a.csv").findings

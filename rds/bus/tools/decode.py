@@ -115,7 +115,10 @@ def load_dbc(path: Path) -> Any:
         reason = str(error).strip() or type(error).__name__
         if len(reason) > _LONGEST_REASON:  # it quotes the line
             reason = f"{reason[:_LONGEST_REASON]}..."
-        raise InputError(f"it can't be read as a DBC file: {reason}", str(path)) from error
+        remedy = "correct that place, or remove it"
+        if "more than 11 bits" in reason:
+            remedy = "where its frames are extended ones, add 2147483648 (2^31) to the number behind BO_"
+        raise InputError(f"it can't be read as a DBC file: {reason}; {remedy}", str(path)) from error
 
 
 def _by_database(database: Any, message: can.Message) -> Decoded | None:

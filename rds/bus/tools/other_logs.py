@@ -1,4 +1,5 @@
-"""Text logs that python-can does not read: SavvyCAN's and GVRET's CSV, BusMaster, CRTD, Microchip's CAN BUS Analyzer.
+"""Text logs that python-can does not read: SavvyCAN's and GVRET's CSV, BusMaster, CRTD, Microchip's CAN BUS Analyzer,
+and what `candump -t a` shows on a terminal.
 
 They are recognized by their first lines, not by their names: .csv, .log and .txt are used by several tools.
 """
@@ -20,6 +21,10 @@ Parse = Callable[[str], can.Message | None]  # a line; None: it describes no fra
 _CRTD = re.compile(r"\d+\.\d+\s+\d*(?:[RT](?:11|29)|C[A-Z]{2})\b")
 _MICROCHIP = re.compile(r"\s*(?://-{3,}|Microchip Technology)")
 _BUSMASTER = re.compile(r"\*{3}BUSMASTER")
+_SHOWN = re.compile(
+    r"\s*\((?P<time>\d+\.\d+)\)\s+\S+\s+(?:(?P<way>RX|TX)\s+\S\s+\S\s+)?"
+    r"(?P<id>[0-9A-F]{3}|[0-9A-F]{8})\s+\[(?P<size>\d+)\]"
+)
 _GVRET = re.compile(r"Time ?Stamp,\s*ID,\s*Extended,", re.IGNORECASE)
 
 
@@ -28,7 +33,8 @@ def kind_of(file: TextIO) -> str | None:
     head = file.read(_HEAD)
     file.seek(0)
     first = head.lstrip("\ufeff")
-    for kind, pattern in (("GVRET", _GVRET), ("BusMaster", _BUSMASTER), ("Microchip", _MICROCHIP), ("CRTD", _CRTD)):
+    patterns = {"GVRET": _GVRET, "BusMaster": _BUSMASTER, "Microchip": _MICROCHIP, "CRTD": _CRTD, "candump": _SHOWN}
+    for kind, pattern in patterns.items():
         if pattern.match(first):
             return kind
     return None
@@ -41,6 +47,7 @@ def parser(kind: str) -> Parse:
         "BusMaster": _BusMaster,
         "Microchip": _Microchip,
         "CRTD": _Crtd,
+        "candump": _Candump,
     }
     return parsers[kind]()
 
@@ -148,3 +155,21 @@ class _Microchip:
         data = bytes(int(word, 16) for word in words[4 : 4 + size] if word)
         stamp = float(words[0]) * 1e-3
         return _message(stamp, identifier, identifier > _STANDARD, data, size, words[1].upper() != "TX")
+
+
+class _Candump:
+    """Time in s in brackets, channel, identifier, length in brackets (two digits: CAN FD), bytes in hexadecimal."""
+
+    def __call__(self, line: str) -> can.Message | None:
+        found = _SHOWN.match(line)
+        if found is None:
+            raise ValueError("no time in brackets, identifier and length")
+        words = line[found.end() :].split()
+        identifier, size = found["id"], int(found["size"])
+        if "ERRORFRAME" in words or len(found["size"]) > 1:
+            return None
+        remote = words[:1] == ["remote"]
+        data = b"" if remote else bytes(int(word, 16) for word in words[:size])
+        return _message(
+            float(found["time"]), int(identifier, 16), len(identifier) > 3, data, size, found["way"] != "TX", remote
+        )

@@ -34,7 +34,7 @@ LEFT_OUT = {
 @dataclass(frozen=True)
 class Linear:
     """The linear part of a fitted axis: τ (s), K ((mm/s)/V), and sentences on what is not in it, and on what the fit
-    warned of: parameters that are not to be used, or are guesses.
+    warned of: parameters that are not to be used, or are guesses. `unit` is that of its position, where not mm.
     """
 
     tau: float
@@ -42,6 +42,7 @@ class Linear:
     left_out: tuple[str, ...]
     name: str  # of the model file, or of the machine's axis
     doubts: tuple[str, ...] = ()
+    unit: str = "mm"
 
 
 def left_out_of(params: Mapping[str, Any]) -> tuple[str, ...]:
@@ -68,7 +69,8 @@ def linear_axis_of(model: Linear | ModelFile | str | Path) -> Linear:
     left_out = [*left_out_of(made.params)]
     if file.is_student:
         left_out.append(f"whatever {Path(file.structure).name} has beside tau and K")
-    return Linear(float(params["tau"]), float(params["K"]), tuple(left_out), Path(file.path).name, tuple(file.doubts()))
+    name, unit = Path(file.path).name, file.output_unit or "mm"
+    return Linear(float(params["tau"]), float(params["K"]), tuple(left_out), name, tuple(file.doubts()), unit)
 
 
 def linear_axis_of_machine(machine: Machine, name: str) -> Linear:
@@ -79,7 +81,7 @@ def linear_axis_of_machine(machine: Machine, name: str) -> Linear:
             f"{name} is a spindle: its speed is measured, and there is nothing to observe; use the controller 'pid'"
         )
     params = axis.model
-    return Linear(params["tau"], params["K"], left_out_of(params), f"axis {name} of {machine.name}")
+    return Linear(params["tau"], params["K"], left_out_of(params), f"axis {name} of {machine.name}", unit=axis.unit)
 
 
 def design_tracking(
@@ -128,7 +130,7 @@ def write_tracking(path: str | Path, model: Linear | ModelFile | str | Path, **o
     not_in_it = f"\nIt knows nothing of:\n{left_out}" if left_out else ""
     doubts = "".join(f"- {sentence}\n" for sentence in axis.doubts)
     not_in_it += f"\nThe fit of tau and K warned:\n{doubts}" if doubts else ""
-    text = _FILE.format(**locals())
+    text = _FILE.format(**locals()).replace("mm/s", f"{axis.unit}/s")
     return write_whole(path, text.encode())
 
 

@@ -132,6 +132,11 @@ def make_task(
             f"excite: duration = {length:g} s makes {samples} samples; take 100 to {_MOST_SAMPLES} of "
             f"{machine.sample_period:g} s"
         )
+    if structure.output_unit != found.unit:
+        raise InputError(
+            f"excite: the model is of an axis in {structure.output_unit}, and axis {axis} of the machine is in "
+            f"{found.unit}; name the axis that it is of (--axis)"
+        )
     if structure.sensitivities is None:
         raise InputError(f"excite: structure {structure.name} has no derivatives; take axis, axis-mass or spindle")
     sigma = float(np.hypot(found.resolution / np.sqrt(12.0), extra))

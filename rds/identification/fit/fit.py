@@ -43,9 +43,11 @@ def fit(
     `structure` by its name or file where its own options and units are not needed (`rds.structure`). InputError for an
     unknown structure, method or option, no logs, or logs that hold nothing to estimate from.
     """
-    logs = [logs] if isinstance(logs, Log) else logs
+    logs = [logs] if isinstance(logs, Log | str | Path) else list(logs)
     if not logs:
         raise InputError("there is no log to fit; name at least one")
+    if (other := next((log for log in logs if not isinstance(log, Log)), None)) is not None:
+        raise InputError(f"{other!r:.60} is no log; read it first: fit(read_log(FILE), ...)")
     structure = make_structure(structure) if isinstance(structure, str | Path) else structure
     named = _names_apart(logs)
     structure = for_logs(structure, named)

@@ -53,7 +53,7 @@ def _bode(estimate: Estimate, log: Log, structure: Structure) -> Picture:
 
     is_rate = structure.is_rate
     response = frequency_response(log, is_rate, estimate.details["period"])
-    return bode_picture(response, estimate.values(), is_rate)
+    return bode_picture(response, estimate.values(), is_rate, estimate.parameters["K"].unit)
 
 
 def _fill(data: bytes, stream: BinaryIO) -> None:

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 def bode_picture(
-    response: FrequencyResponse, values: Mapping[str, float] | None = None, is_rate: bool = False
+    response: FrequencyResponse, values: Mapping[str, float] | None = None, is_rate: bool = False, unit: str = ""
 ) -> Picture:
-    """Bode diagram of `response`; with `values` (tau, K, delay) the model's beside it."""
+    """Bode diagram of `response`; with `values` (tau, K, delay) the model's beside it. `unit` is that of K."""
     picture = Picture(9.0)
     magnitude, phase, coherence = picture.subplots(3, 1, sharex=True, height_ratios=(3, 3, 2))
-    f, unit = response.frequency, "(rev/min)/V" if is_rate else "(mm/s)/V"
+    f, unit = response.frequency, unit or ("(rev/min)/V" if is_rate else "(mm/s)/V")
     low, high = response.magnitude_band
     size = np.abs(response.response)
     magnitude.fill_between(
@@ -38,7 +38,11 @@ def bode_picture(
         phase.semilogx(fine, np.rad2deg(np.unwrap(np.angle(model))), **line)
     coherence.semilogx(f, response.coherence, color=GREEN, linewidth=1.3)
     coherence.set_ylim(min(0.9, float(response.coherence.min()) - 0.02), 1.005)
-    dress(magnitude, f"{'speed' if is_rate else 'velocity'} over voltage [{unit}]", None)
+    dress(
+        magnitude,
+        f"{'speed' if is_rate else 'velocity'} over {'voltage' if unit.endswith('/V') else 'command'} [{unit}]",
+        None,
+    )
     dress(phase, "phase [°]", None)
     dress(coherence, "coherence", "frequency [Hz]")
     legend(magnitude)

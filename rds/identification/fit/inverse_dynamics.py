@@ -205,7 +205,7 @@ def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, A
         for name, value in options.items()
         if value is not None
     }
-    hold = numbers.get("hold", 0.0 if structure.given else 0.5)
+    hold = numbers.get("hold", 0.0 if structure.name == "axis-mass" else 0.5)
     if hold > 1.0:
         raise InputError(f"inverse-dynamics: hold = {hold:g} must be at most 1 ({OPTIONS['hold'].meaning})")
     rate = 1.0 / float(np.mean([log.sample_period for log in logs]))

@@ -81,7 +81,10 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
             times[name].append(message.timestamp - start)
             values[name].append(value)
     if not number:
-        raise InputError("it holds no frames; record it again or take another copy", str(path))
+        what = (
+            f"no bus could carry any of its {log.impossible} frames (identifier, or length)" if log.impossible else ""
+        )
+        raise InputError(f"{what or 'it holds no frames'}; record it again or take another copy", str(path))
     if not times:
         seen = ", ".join(f"{identifier:#x}" for identifier in sorted(unknown)[:8]) or "none"
         raise InputError(
@@ -94,6 +97,11 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
     if path.suffix.lower() in _LINES and not _ends(path):
         what = "its last line has no end: the recording was cut there, and its last frame may be wrong"
         findings.append(Finding("cut", what, Gravity.WARNING))
+    if own is not None:
+        named = ", ".join(sorted({name.partition(".")[0] for name in times})[:8])
+        what = f"no DBC file is given, so frames were read as those of RDS's own modules ({named}); where others sent "
+        what += 'them, give the DBC file that describes them: dbc = "axes.dbc" under [bus] in a map'
+        findings.append(Finding("frames", what, Gravity.WARNING if unknown or misfits else Gravity.NOTE))
     if unknown:
         findings.append(Finding("frames", f"{sum(unknown.values())} frames of {len(unknown)} identifiers are unknown"))
     if misfits:

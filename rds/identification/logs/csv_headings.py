@@ -3,7 +3,8 @@
 Beside `name [unit]` these are: `name/unit`, `name in unit`, `name, unit` and `name {unit}`; the head of LabVIEW's .lvm
 files, whose units stand in a row of their own; and tables in which each channel has a column of times before it, headed
 by rows of label and value in turn (`Name;ActPos;Name;SetPos`, `Unit;mm;Unit;mm`), as TwinCAT's scope exports them, or
-NI's SignalExpress (`Channel name,"Force"`, `Interval,0.0005`). Mitsubishi's drives head their times by the unit: `ms`.
+NI's SignalExpress (`Channel name,"Force"`, `Interval,0.0005`). TwinCAT's scope also gives channels one column of times
+together (`Name;ActPos;SetPos;Name;CmdVolt`). Mitsubishi's drives head their times by the unit: `ms`.
 """
 
 from __future__ import annotations
@@ -19,17 +20,23 @@ Split = Callable[[str], list[str]]
 _BRACES = re.compile(r"(?P<name>.*?)\s*\{(?P<unit>[^{}]*)\}\s*")
 _BETWEEN = re.compile(r"\s*[/,]\s*|\s+[iI][nN]\s+")  # a name and its unit
 _LABVIEW, _LABVIEW_UNITS, _LABVIEW_TIME = "LabVIEW Measurement", "Y_Unit_Label", "X_Dimension"
+_SCALES = (("scalefactor", "1"), ("offset", "0"), ("unit scalefactor", "1"), ("unit offset", "0"))
+_LEAST_TIMES = 2  # columns of times
 _PAIR_NAMES, _PAIR_UNIT = ("name", "channel name"), "unit"
 _PAIR_TIMES = {"sampletime[ms]": "ms", "interval": "s"}  # which label says in which unit the times are
 _TIMES_ALONE = ("ms", "us", "µs", "μs")  # headings of a time by its unit; `s` may be a way, `min` a least one
 
 
 class Headings(NamedTuple):
-    """`paired`: every other column holds the times of the column after it."""
+    """`times`: which columns hold the times of the columns after them; none where there is one time, or none.
+
+    `scaled`: channels with a factor or an offset, of which the file does not tell whether its numbers have it.
+    """
 
     names: tuple[str, ...]
     units: tuple[str | None, ...]
-    paired: bool = False
+    times: tuple[int, ...] = ()
+    scaled: tuple[str, ...] = ()
 
 
 def alternates(units: Sequence[str | None]) -> bool:
@@ -66,20 +73,52 @@ def labview_units(above: Sequence[str], split: Split, names: Sequence[str]) -> t
     return tuple(units)
 
 
-def paired_headings(above: Sequence[str], split: Split, width: int) -> Headings | None:
-    """The headings of a table whose channels each have times of their own; None of any other table."""
+def labelled_headings(lines: Sequence[str], split: Split) -> Headings | None:
+    """The headings of a table whose channels have times of their own, by rows of labels; None of any other table.
+
+    A label stands above each column of times: `Name;ActPos;Name;CmdVolt`, or `Name;ActPos;CmdVolt;Name;Torque`.
+    """
     rows: dict[str, list[str]] = {}
-    for line in above:
-        cells = split(line)[:width]
-        if width % 2 == 0 and len(cells) == width and len(set(cells[::2])) == 1:
-            rows.setdefault(cells[0].casefold(), cells[1::2])
-    named = next((rows[label] for label in _PAIR_NAMES if label in rows), None)
-    if named is None or width < 4 or len(set(named)) < len(named):
+    times: tuple[int, ...] = ()
+    for line in lines:
+        cells = split(line)
+        label = cells[0].casefold() if cells else ""
+        if label in _PAIR_NAMES and not times:
+            while len(cells) > 1 and not cells[-1]:  # a delimiter at the end
+                cells.pop()
+            found = tuple(i for i, cell in enumerate(cells) if cell.casefold() == label)
+            if len(found) < _LEAST_TIMES or len(cells) - 1 in found:
+                continue  # `Name;Project`, above the table
+            times, rows[label] = found, cells
+    if not times:
         return None
-    units = rows.get(_PAIR_UNIT, [""] * len(named))
-    time = next((unit for label, unit in _PAIR_TIMES.items() if label in rows), None)
+    width = len(next(iter(rows.values())))
+    labels = set()
+    for line in lines:
+        cells = split(line)
+        labels |= {cell.casefold() for cell in cells[:1]}
+        if len(cells) >= width and len({cells[i] for i in times}) == 1:
+            rows.setdefault(cells[0].casefold(), cells[:width])
+    names = next(rows[label] for label in _PAIR_NAMES if label in rows)
+    channels = [name for i, name in enumerate(names) if i not in times]
+    if len(set(channels)) < len(channels):
+        return None
+    units = [_labelled_unit(cell) for cell in rows.get(_PAIR_UNIT, [""] * width)]
+    time = next((unit for label, unit in _PAIR_TIMES.items() if label in labels), None)
     return Headings(
-        names=tuple(name for channel in named for name in (f"time of {channel}", channel)),
-        units=tuple(unit for own in units for unit in (time, own.strip("[]() ") or None)),
-        paired=True,
+        names=tuple(f"time of {names[i + 1]}" if i in times else names[i] for i in range(width)),
+        units=tuple(time if i in times else units[i] for i in range(width)),
+        times=times,
+        scaled=tuple(
+            name
+            for i, name in enumerate(names)
+            if i not in times and any(rows[label][i] not in ("", usual) for label, usual in _SCALES if label in rows)
+        ),
     )
+
+
+def _labelled_unit(cell: str) -> str | None:
+    """The unit in `mm`, `[mm]`, `(mm)` or TwinCAT's `V (Voltage)`; its `(None)` is none."""
+    own, _, remark = cell.partition("(")
+    unit = own.strip("[] ") or remark.strip("[]() ")
+    return None if unit.casefold() in ("", "none") else unit

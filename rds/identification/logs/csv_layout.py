@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rds.core.errors import InputError
-from rds.identification.logs.csv_headings import Headings, alternates, labview_units, name_and_unit, paired_headings
+from rds.identification.logs.csv_headings import Headings, alternates, labelled_headings, labview_units, name_and_unit
 from rds.identification.logs.units import dimension
 from rds.results.units import split_heading
 
@@ -24,6 +24,10 @@ COMMENTS = ("#", "%", "//", "!")
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
 BLANKS = frozenset(("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "+inf"))
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+_CLOCK = re.compile(r"\d\d:\d\d:\d\d(\.\d{1,9})?")  # a time of day
+_RIGOL = re.compile(
+    r"X,(CH\d,)+Start,Increment,?\s*"
+)  # an oscilloscope's first line; the second has units, start, step
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,12 @@ class Layout:
     words: frozenset[int]  # columns whose cells are no numbers
     dates: Mapping[int, bool]  # columns of dates and times of day: whether their first one says its zone
     announced: int | None = None  # samples, where a comment says how many there should be
-    paired: bool = False  # every other column holds the times of the column after it
+    times: tuple[int, ...] = ()  # columns that hold the times of the columns after them
+    ragged: bool = False  # channels end one after another, and rows with them
+    clocks: frozenset[int] = frozenset()  # which of the dates are times of day alone
+    counted: tuple[float, float] | None = None  # the first column is a number of the sample: time of the first, step
+    passed: str = ""  # a line above the data that has numbers in it, too
+    scaled: tuple[str, ...] = ()  # channels of which nothing tells whether their numbers are scaled
 
 
 def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
@@ -63,14 +72,19 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
             remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
     _, width, mark, point, first = best
-    found_heads = paired_headings(lines[:first], lambda line: split(line, mark), width)
+    found_heads = labelled_headings(lines[:first], lambda line: split(line, mark)) if mark != " " else None
+    labelled = found_heads is not None
     if found_heads is None:
         first = _with_faulty_rows(lines, first, mark, point, width)
         found_heads = _headings(lines, first, mark, point, width)
-    names, units, paired = found_heads
+    names, units, times, scaled = found_heads
+    width = len(names)
+    if labelled:  # most rows may be shorter, as channels end one after another
+        first = _below_labels(lines, first, mark, point, width)
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
     stamps = {i: found for i in range(width) for row in body[:1] if (found := _DATE.fullmatch(row[i]))}
-    dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()}
+    clocks = frozenset(i for i in range(width) for row in body[:1] if _CLOCK.fullmatch(row[i]))
+    dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()} | dict.fromkeys(clocks, False)
     words = frozenset(
         i
         for i in range(width)
@@ -79,8 +93,29 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         and not any(is_number(row[i], point) for row in body)
         and any(row[i].lower() not in BLANKS for row in body)
     )
+    times = times or (tuple(range(0, width, 2)) if alternates(units) else ())
+    announced = _announced(lines[:first])
+    numbers = [i for i in range(width) if any(is_number(row[i], point) for row in body[:_FEW])]
+    passed = "" if labelled else _passed(lines[:first], mark, point, width, numbers)
+    counted = None
+    if _RIGOL.fullmatch(lines[0]) and first > 1:
+        names, units, counted = _of_rigol(lines[0], lines[1], names, units)
     return Layout(
-        encoding, mark, point, first, names, units, words, dates, _announced(lines[:first]), paired or alternates(units)
+        encoding,
+        mark,
+        point,
+        first,
+        names,
+        units,
+        words,
+        dates,
+        announced,
+        times,
+        labelled,
+        clocks,
+        counted,
+        passed,
+        scaled,
     )
 
 
@@ -154,7 +189,9 @@ def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int,
     for number, line in enumerate(lines):
         if line.strip() and not is_comment(line):
             cells = split(line, delimiter)
-            kinds = [is_number(cell, decimal) or bool(_DATE.fullmatch(cell)) for cell in cells]
+            kinds = [
+                is_number(cell, decimal) or bool(_DATE.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in cells
+            ]
             blanks = sum(cell.lower() in BLANKS for cell in cells)
             if any(kinds) and sum(kinds) + blanks >= len(cells) / 2:
                 fits = [kind or cell.lower() in BLANKS for kind, cell in zip(kinds, cells, strict=True)]
@@ -181,6 +218,38 @@ def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal:
     return at if heading is not None else first
 
 
+def _passed(above: Sequence[str], delimiter: str, decimal: str, width: int, numbers: Sequence[int]) -> str:
+    """The last line above the data that has numbers where they have, two or more; "" where none has."""
+    for line in reversed(above):
+        cells = split(line, delimiter)
+        if len(cells) == width and len(numbers) > 1 and all(is_number(cells[i], decimal) for i in numbers):
+            return line
+    return ""
+
+
+def _of_rigol(
+    head: str, below: str, names: tuple[str, ...], units: tuple[str | None, ...]
+) -> tuple[tuple[str, ...], tuple[str | None, ...], tuple[float, float] | None]:
+    """Names, units, and time of the first sample and step, of a table whose first column counts the samples."""
+    channels = [cell for cell in split(head, ",") if cell.startswith("CH")]
+    _, *own = split(below, ",")
+    try:
+        counted = float(own[len(channels)]), float(own[len(channels) + 1])
+    except (IndexError, ValueError):
+        return names, units, None
+    found = len(channels) + 1
+    return ("time", *channels, *names[found:]), ("s", *own[: len(channels)], *units[found:]), counted
+
+
+def _below_labels(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> int:
+    """The first whole row of numbers, at `first` or before it."""
+    for number, line in enumerate(lines[:first]):
+        cells = split(line, delimiter)
+        if len(cells) >= width and all(is_number(cell, decimal) for cell in cells if cell.lower() not in BLANKS):
+            return number
+    return first
+
+
 def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
     """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
     above = [line for line in lines[:first] if line.strip()][-2:]
@@ -199,6 +268,8 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
     names = []
     for i, cell in enumerate(heads):
         name, unit = name_and_unit(cell.strip('"'))
+        if units[i] is not None and unit is not None and dimension(unit) is None:
+            name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
         names.append(name or f"column {i + 1}")
         units[i] = unit if unit is not None else units[i]
     of_labview = labview_units(lines[:first], lambda line: split(line, delimiter), names)

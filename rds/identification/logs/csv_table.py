@@ -25,7 +25,9 @@ _BLOCK = 1 << 22  # bytes
 _TAIL = 1 << 14  # bytes at the end in which a cut is looked for
 _REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")
 _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
-_NULLS = [*BLANKS, *(word.upper() for word in BLANKS), "NaN", "Null", "None", "Inf", "+Inf", "-Inf"]
+_DAY = 86400.0  # s
+_END = b"EOF"  # the last line of an export of TwinCAT's scope
+_NULLS = [" ", *BLANKS, *(word.upper() for word in BLANKS), "NaN", "Null", "None", "Inf", "+Inf", "-Inf"]
 
 
 def read_csv(
@@ -82,6 +84,13 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
     if remarks:
         findings.append(Finding("comments", f"{remarks} remarks between the rows were passed over"))
     rows = max(map(len, values.values()), default=0)
+    if layout.passed:
+        what = f"a line above the first row of data has numbers, too, and was passed over: {layout.passed[:80]!r}"
+        findings.append(Finding("headings", what, Gravity.WARNING))
+    if layout.scaled:
+        what = f"{', '.join(layout.scaled[:8])}: a factor or an offset stands in the head of the file, which does not "
+        what += "tell whether it is applied; compare the values with what was displayed, and give scale in a map if not"
+        findings.append(Finding("units", what, Gravity.WARNING))
     if layout.announced is not None and layout.announced > rows:
         findings.append(missing_samples(layout.announced, rows, "the file announces"))
     columns = {}
@@ -92,26 +101,34 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
         elif not (at and at == len(names) - 1 and name == f"column {at + 1}" and np.isnan(values[at]).all()):
             # but for what a delimiter at the end of each line makes
             columns[name] = Column(name, "s" if at in layout.dates else unit, values[at])
-    if layout.paired:
-        columns = _with_own_times(columns)
+    if layout.counted is not None:
+        begin, step = layout.counted
+        columns["time"] = replace(columns["time"], values=begin + step * columns["time"].values)
+    if layout.times:
+        columns = _with_own_times(columns, layout.times)
     return Table(path, "csv", columns, findings=tuple(findings))
 
 
-def _with_own_times(columns: Mapping[str, Column]) -> dict[str, Column]:
+def _with_own_times(columns: Mapping[str, Column], at: Sequence[int]) -> dict[str, Column]:
     """Channels with the times before them; one column of time where all have the same, as they are where no unit is."""
-    times, channels = [*columns.values()][::2], [*columns.values()][1::2]
+    listed = [*columns.values()]
+    times = {i: listed[i] for i in at}
     if any(
         c.unit is None or c.text is not None or not (np.diff(c.values[np.isfinite(c.values)]) >= 0.0).all()
-        for c in times
+        for c in times.values()
     ):
         return dict(columns)  # not known, or no times
-    if all(np.array_equal(column.values, times[0].values, equal_nan=True) for column in times):
-        return {"time": Column("time", times[0].unit, times[0].values)} | {c.name: c for c in channels}
+    channels = [column for i, column in enumerate(listed) if i not in times]
+    first = listed[at[0]]
+    if all(np.array_equal(column.values, first.values, equal_nan=True) for column in times.values()):
+        return {"time": Column("time", first.unit, first.values)} | {c.name: c for c in channels}
     found = {}
-    for time, channel in zip(times, channels, strict=True):
-        there = np.isfinite(time.values)  # a slower channel has fewer rows
-        second = factor(str(time.unit), "s")
-        found[channel.name] = replace(channel, values=channel.values[there], time=time.values[there] * second)
+    for i, column in enumerate(listed):
+        if i in times:
+            there = np.isfinite(column.values)  # a slower channel has fewer rows
+            own = column.values[there] * factor(str(column.unit), "s")
+        else:
+            found[column.name] = replace(column, values=column.values[there], time=own)
     return found
 
 
@@ -141,6 +158,7 @@ def _read(
     types = {key: pa.string() if int(key) in words else pa.float64() for key in keys}
     dates = {i: zone for i, zone in layout.dates.items() if i not in words}
     types |= {str(i): pa.timestamp("ns", tz="UTC" if zone else None) for i, zone in dates.items()}
+    types |= {str(i): pa.time64("ns") for i in layout.clocks if i in dates}
 
     refused: list[Any] = []
 
@@ -186,6 +204,8 @@ def _read(
     for i in list(values):
         column = np.concatenate(values.pop(i) or [np.empty(0, dtype="datetime64[ns]" if i in dates else np.float64)])
         joined[i] = since_first(column) if i in dates else column
+        if i in layout.clocks:
+            joined[i] = _through_midnight(joined[i])
     return joined, {i: texts.get(i, (0, "")) for i in words}, stream.remarks
 
 
@@ -196,6 +216,7 @@ class _Rows:
         self._file, self._path = open(path, "rb"), path  # noqa: SIM115 (closed by close())
         self.problem: InputError | None = None  # Arrow passes on no error that is raised here
         self._end, self._spaces = end, layout.delimiter == " "
+        self._delimiter, self._width = layout.delimiter.encode(), len(layout.names) if layout.ragged else 0
         for _ in range(layout.first):
             self._file.readline()  # within what the layout was found in
         self.remarks, self.closed = 0, False
@@ -217,7 +238,15 @@ class _Rows:
             self.remarks += remarks
             if self._spaces:
                 data = re.sub(rb"[ \t]+", b" ", _SPACES.sub(b"", data))
+            if self._width:
+                data = b"".join(map(self._filled, data.splitlines()))
         return data
+
+    def _filled(self, line: bytes) -> bytes:
+        """A row with all its cells: TwinCAT's scope leaves out those of the channels that have ended."""
+        if not line.strip() or line.strip() == _END:
+            return b""
+        return line + self._delimiter * (self._width - 1 - line.count(self._delimiter)) + b"\n"
 
     def _rest_of_line(self) -> bytes:
         most = int(LINE * lifted())
@@ -256,13 +285,22 @@ def _numbers(cells: Any) -> np.ndarray:
     """
     import pyarrow as pa
 
-    dates = pa.types.is_timestamp(cells.type)
+    dates = pa.types.is_timestamp(cells.type) or pa.types.is_time(cells.type)
     numbers = cells.view(pa.int64()) if dates else cells
     if numbers.null_count:
         numbers = numbers.fill_null(np.iinfo(np.int64).min if dates else np.nan)  # the first is NumPy's "no date"
     kind = np.int64 if dates else np.float64
     found = np.frombuffer(numbers.buffers()[1], kind, len(numbers), numbers.offset * np.dtype(kind).itemsize)
     return found.view("datetime64[ns]") if dates else found
+
+
+def _through_midnight(seconds: np.ndarray) -> np.ndarray:
+    """Times of day that go on where a day begins."""
+    there = np.flatnonzero(np.isfinite(seconds))
+    days = np.cumsum(np.diff(seconds[there], prepend=0.0) < -0.5 * _DAY)
+    gone_on = seconds.copy()
+    gone_on[there] += _DAY * days
+    return gone_on
 
 
 def _first_word(cells: Sequence[str | None], decimal: str) -> tuple[int, str] | None:
@@ -297,6 +335,8 @@ def _end(path: Path, layout: Layout) -> tuple[int, Finding | None]:
     if tail.endswith((b"\n", b"\r")):
         return size, None
     *before, last = tail.rstrip(b" \t").split(b"\n")
+    if layout.ragged:
+        return size, None
     others = [line for line in before[1:] if line.strip()]
     cells = len(split(last.decode(layout.encoding, "replace"), layout.delimiter))
     if others and (cells < len(layout.names) or len(last) < min(map(len, others)) - 1):  # a \r is no character of a row

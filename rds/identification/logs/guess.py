@@ -191,14 +191,28 @@ def _spoiled(table: Table, quantity: str) -> str:
     return ""
 
 
+def _why_no_time(column: Column) -> str:
+    """What a column that is called a time does in its place, and what to do."""
+    rows, steps = len(column.values), np.diff(column.values[np.isfinite(column.values)])
+    if len(steps) and np.mean(steps < 0.0) >= _RISING:
+        return f"{column.name!r} goes down from row to row; sort the rows by it, the oldest first"
+    if len(steps) and steps.min() == 0.0 and steps.max() > 0.0:
+        return (
+            f"{column.name!r} stays the same in {int(np.sum(steps == 0.0))} of {rows} rows: its stamps are coarser "
+            "than the sample period; export it with more digits, or, if the rows are equally spaced in time, say so in "
+            "a map: rate = 1000.0 (Hz) under [time] in place of the column"
+        )
+    return f"{column.name!r} does not increase from row to row ({rows} rows)"
+
+
 def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     """Why a table is no log over time, and what it is instead."""
     units = {dimension(c.unit or "") for c in columns} | {"adc" for c in columns if c.name.endswith("_adc")}
     numbered = next((c.name for c in columns if c.name.lower() in _ORDINALS), None)
     sentence = f"{_NO_LOG}: "
     if any(_role(c.name) == "time" for c in in_time):
-        name = next(c.name for c in in_time if _role(c.name) == "time")
-        return f"{sentence}{name!r} does not increase from row to row ({len(in_time[0].values)} rows)"
+        column = next(c for c in in_time if _role(c.name) == "time")
+        return sentence + _why_no_time(column)
     if in_time:
         names = ", ".join(c.name for c in in_time[:3]) + (" ..." if len(in_time) > 3 else "")
         sentence += f"its columns in s ({names}) are durations, and none increases from row to row"

@@ -10,6 +10,8 @@ import numpy as np
 
 _MOST_COLUMNS = 1000  # of a matrix; a picture is no log
 _DEEPEST = 20  # structs in structs
+_MOST_STRUCTS = 1000  # in an array
+_LABELS = ("label", "Name", "name")  # of Simulink's and dSPACE's structs
 
 
 class Part(NamedTuple):
@@ -41,11 +43,27 @@ def parts_of(name: str, values: Any, depth: int = 0) -> Iterator[Part]:
         yield Part(name, None, of_class)
     elif not isinstance(values, np.ndarray) or depth > _DEEPEST:  # a sparse matrix
         yield Part(name, None)
-    elif values.dtype.names and values.size == 1:
-        for field in values.dtype.names:
-            yield from parts_of(f"{name}.{field}", values.reshape(-1)[0][field], depth + 1)
+    elif values.dtype.names and values.size <= _MOST_STRUCTS:
+        for element, record in zip(_names(name, values), values.reshape(-1), strict=True):
+            for field in values.dtype.names:
+                yield from parts_of(f"{element}.{field}", record[field], depth + 1)
     else:
         yield from numbers(name, values)
+
+
+def _names(name: str, structs: np.ndarray) -> list[str]:
+    """What the elements of an array of structs are called: by their labels, as Simulink's scopes and dSPACE have them.
+
+    By their numbers, `signals_1`, where they have none or not each its own.
+    """
+    if structs.size == 1:
+        return [name]
+    for field in _LABELS:
+        if field in (structs.dtype.names or ()):
+            texts = [str(one[field].item()) if one[field].size == 1 else "" for one in structs.reshape(-1)]
+            if len(set(texts)) == len(texts) and all(text and text.isprintable() for text in texts):
+                return [f"{name}.{text}" for text in texts]
+    return [f"{name}_{i + 1}" for i in range(structs.size)]
 
 
 def _class_of(values: Any) -> str:

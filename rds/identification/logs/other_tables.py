@@ -72,10 +72,12 @@ def _parts(path: Path) -> list[Part]:
 
 def _parts_here(path: Path) -> list[Part]:
     """The variables of a file up to version 7.2, in this process."""
+    from rds.results import mat5
     from rds.results.mat_file import variables
 
     found = variables(path)
     parts = [part for name, values in found.items() if not name.startswith("__") for part in parts_of(name, values)]
+    parts += [Part(name, None, of_class) for name, of_class in mat5.objects(path).items()]
     allow_unpacked(8 * sum(part.values.size for part in parts if part.values is not None), path.stat().st_size)
     return parts
 

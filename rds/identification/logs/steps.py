@@ -51,10 +51,11 @@ def quantization(log: Log, axis: Axis | None) -> list[Finding]:
     """The steps of position and command, and whether the position's is the one that was stated."""
     found = []
     unit = log.units.get("position", "mm")
+    measured = "speed" if log.is_rate else "position"
     step = step_of(log.position)
     stated = axis.resolution if axis is not None and axis.unit == unit else log.resolution
     if step is not None:
-        what = f"position comes in steps of {step:.6g} {unit}"
+        what = f"{measured} comes in steps of {step:.6g} {unit}"
         if stated is not None and not 0.99 < step / stated < 1.01:
             multiple = step / stated
             if 0.99 < multiple / round(multiple) < 1.01 if multiple > 1.0 else False:
@@ -67,7 +68,7 @@ def quantization(log: Log, axis: Axis | None) -> list[Finding]:
         else:
             found.append(Finding("quantization", what))
     elif stated is not None:
-        what = f"no steps are seen in the position, where the resolution is stated as {stated:.6g} {unit}"
+        what = f"no steps are seen in the {measured}, where the resolution is stated as {stated:.6g} {unit}"
         found.append(Finding("quantization", f"{what}: it was filtered, interpolated or simulated"))
     volts = step_of(log.command)
     if volts is not None and len(np.unique(log.command[:_LOOKED_AT])) > _LEVELS:

@@ -80,7 +80,10 @@ class Table:
 def remedy(cell: str) -> str:
     """What to do about a cell that is no number."""
     if _DATE.match(cell):
-        return "write dates as 2024-05-01 12:00:00.001 (of others nobody knows which is the day), or the time in s"
+        return (
+            "write dates as 2024-05-01 12:00:00.001 (of others nobody knows which is the day), times of day as "
+            "12:00:00.001, or the time in s"
+        )
     if _THOUSANDS.fullmatch(cell):
         return (
             "every cell must be a number: if this comma parts the thousands, export the file without it; if it is a "

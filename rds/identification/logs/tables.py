@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import codecs
 import hashlib
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +14,9 @@ from rds.identification.logs.table import Table
 
 Progress = Callable[[int, int], None]
 TEXTS = (".csv", ".txt", ".dat", ".tsv", ".prn", ".lvm")
-BUSES = (".asc", ".blf", ".log", ".trc", ".mf4", ".db")
+BUSES = (".asc", ".blf", ".log", ".trc", ".mf4", ".db", ".can", ".crtd")
 MEASUREMENTS = (".mf4", ".mdf", ".dat")  # of which some are text, and some bus logs
+_BUS_CSV = re.compile(rb"timestamp,arbitration_id,|time ?stamp,\s*id,\s*extended,", re.IGNORECASE)
 
 
 def read_table(
@@ -66,6 +69,6 @@ def read_table(
 
 
 def _is_bus_csv(path: Path) -> bool:
-    """Whether a CSV file is python-can's."""
+    """Whether a CSV file is python-can's, or SavvyCAN's and GVRET's."""
     with open(path, "rb") as stream:
-        return stream.read(30).startswith(b"timestamp,arbitration_id,")
+        return _BUS_CSV.match(stream.read(60).removeprefix(codecs.BOM_UTF8)) is not None

@@ -40,7 +40,7 @@ _DIMENSIONS: Mapping[str, tuple[str, Mapping[str, float]]] = MappingProxyType(
 _SPELLINGS: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(("sec", "secs", "second", "seconds", "Sekunden"), "s"),
-        **dict.fromkeys(("sek", "Sek", "Sec"), "s"),
+        **dict.fromkeys(("sek", "Sek", "Sec", "Second", "Seconds", "Sekunde"), "s"),
         **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
         **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
         **dict.fromkeys(("meter", "metre", "meters", "metres"), "m"),
@@ -56,7 +56,7 @@ _SPELLINGS: Mapping[str, str] = MappingProxyType(
         **dict.fromkeys(("count", "cts", "inc", "incs", "increments", "ticks", "pulses"), "counts"),
         **dict.fromkeys(("cts/s", "inc/s", "ticks/s"), "counts/s"),
         **dict.fromkeys(("volt", "volts", "Volt", "Volts"), "V"),
-        **dict.fromkeys(("ampere", "amperes", "amp", "amps"), "A"),
+        **dict.fromkeys(("ampere", "amperes", "amp", "amps", "Ampere", "Amp", "Amps"), "A"),
         **dict.fromkeys(("N.m", "N*m", "N·m"), "Nm"),
         **dict.fromkeys(("percent", "pct"), "%"),
         **dict.fromkeys(("‰", "per mille", "0.1%", "0,1%"), "permille"),

@@ -31,6 +31,7 @@ from rds.identification.fit.residuals import effective_samples
 from rds.identification.fit.solve import Solution, first_state, least_squares
 from rds.identification.fit.uncertainty import uncertainty_of
 from rds.identification.logs.log import Log
+from rds.identification.structures.signals import POSITIONS
 from rds.identification.structures.structure import Start, Structure
 from rds.identification.validate.candidate import Candidate
 
@@ -273,6 +274,8 @@ def _axis_of(candidate: Candidate) -> tuple[Structure, dict[str, float]] | None:
             return None
         if values.pop("name") != "linear-axis":
             return None
+        per_position = POSITIONS[made.output_unit][1]  # the library's axis has deg/s where a log has rev/min
+        values |= {name: values[name] / per_position for name in _LINEAR - {"tau"}}
         options = ()
     elif made.name != "axis" and not (set(values) == _LINEAR and made.name == "linear-axis"):
         return None

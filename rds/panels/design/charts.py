@@ -139,7 +139,7 @@ def details(design: TrackingDesign, cloud: Cloud | None) -> str:
     """Poles, the observer's numbers, and what the design does not know of."""
     gains = design.gains
     rows = [["poles", f"{_shown(design)} 1/s"], ["observer pole", f"{design.observer_pole:.4g} 1/s"]]
-    for name, unit in (("L", " 1/s"), ("F", ""), ("G", " 1/s"), ("H", " (mm/s)/V")):
+    for name, unit in (("L", " 1/s"), ("F", ""), ("G", " 1/s"), ("H", f" ({design.axis.unit}/s)/V")):
         rows.append([f"observer's {name}", f"{gains[name]:.5g}{unit}"])
     return table(["", ""], rows) + notes_list(_notes(design, cloud))
 
@@ -152,7 +152,7 @@ def _shown(design: TrackingDesign) -> str:
 
 
 def _notes(design: TrackingDesign, cloud: Cloud | None) -> list[str]:
-    said = [f"for {design.axis.name}: τ = {design.axis.tau:.4g} s, K = {design.axis.K:.4g} (mm/s)/V"]
+    said = [f"for {design.axis.name}: τ = {design.axis.tau:.4g} s, K = {design.axis.K:.4g} ({design.axis.unit}/s)/V"]
     if cloud is not None:
         count = len(cloud.margins)
         lost = f"✖ unstable for {cloud.unstable} of {count}" if cloud.unstable else f"✔ stable for all {count}"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -16,11 +17,11 @@ import canopen
 from canopen.sdo import SdoAbortedError
 
 from rds.bus.modules.cia402 import examination
-from rds.bus.modules.cia402.codes import NmtCommand
+from rds.bus.modules.cia402.codes import Mode, NmtCommand
 from rds.bus.modules.cia402.commissioned import Choices, cia402_table, machine_text
 from rds.bus.modules.cia402.configure import library, load
 from rds.bus.modules.cia402.first_motion import FirstMotion, first_motion
-from rds.bus.modules.cia402.identity import Identity, check_eds, identify, keep_eds, kept_eds, number
+from rds.bus.modules.cia402.identity import Identity, check_eds, identify, keep_eds, kept_eds, number, upload
 from rds.bus.modules.cia402.mapping import find_fixed, map_dynamically
 from rds.bus.modules.cia402.parameters import store
 from rds.bus.modules.cia402.settings import Command, DriveSettings, read_settings
@@ -217,6 +218,9 @@ def _mapping(
     wished = (options.mode,) if options.mode else ORDER
     modes = [mode for mode in wished if identity.has(Command[mode.upper()].mode)]
     refused = f"it has no mode {' or '.join(wished)} (0x6502 = {identity.modes or 0:#x})"
+    if identity.modes is None:
+        modes = [mode for mode in wished if _accepts(_bare(network, choices.node), Command[mode.upper()].mode)]
+        refused = f"it has no list of modes (0x6502), and does not accept {' or '.join(wished)} in 0x6060"
     for mode in modes:
         refused = ""
         for fixed in (False, True):
@@ -316,9 +320,25 @@ def _bare(network: canopen.Network, number_: int) -> canopen.RemoteNode:
     return node
 
 
-def _has_torque(bus: can.BusABC, node: int) -> bool:
+def _has_torque(bus: can.BusABC, number_: int) -> bool:
     with library(bus) as network:
-        return identify(_bare(network, node)).has(Command.CST.mode)
+        node = _bare(network, number_)
+        modes = identify(node).modes
+        listed = _accepts(node, Command.CST.mode) if modes is None else bool(modes & Command.CST.mode.supported_bit)
+        return listed and number(node, Command.CST.target) is not None
+
+
+def _accepts(node: canopen.RemoteNode, mode: Mode) -> bool:
+    """Whether the mode can be chosen; the one before is written back. Without power it changes nothing else."""
+    before = upload(node, 0x6060)
+    try:
+        node.sdo.download(0x6060, 0, int(mode).to_bytes(1, "little", signed=True))
+    except SdoAbortedError:
+        return False
+    if before is not None:
+        with suppress(SdoAbortedError):  # 0 is no mode, and some drives take none
+            node.sdo.download(0x6060, 0, before)
+    return True
 
 
 class _machine:

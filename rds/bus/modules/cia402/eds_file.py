@@ -46,6 +46,12 @@ def read_eds(path: str | Path, node: int) -> canopen.ObjectDictionary:
     parser = configparser.RawConfigParser(
         strict=False, allow_no_value=True, inline_comment_prefixes=(";",), delimiters=("=",)
     )
+    if place.read_bytes()[:100].lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<?xml"):
+        raise InputError(
+            "it is XML (an XDD, or a description for EtherCAT), and no EDS; take the maker's EDS, or export one from "
+            "it, as CANopenEditor does",
+            str(path),
+        )
     try:
         parser.read_string(_text(place.read_bytes()))
     except configparser.Error as error:
