@@ -217,7 +217,7 @@ class _Reader:
         self.name, self.scale, self.blocks, self.off = name, scale, blocks, off
         self.curves: list[Curve] = []
         self.passed_over: dict[str, int] = {}
-        self.taken = 0  # points of the curves so far, and inserts
+        self.taken = 0  # points of the curves so far; an insert counts as fifty
 
     def _pass_over(self, what: str) -> None:
         self.passed_over[what] = self.passed_over.get(what, 0) + 1
@@ -311,7 +311,7 @@ class _Reader:
         place = np.array([_number(body, 10), _number(body, 20)]) - turn @ np.array([bx, by])
         columns, rows = (max(int(_number(body, code, 1.0)), 1) for code in (70, 71))
         for k in range(columns * rows):  # an array: its distances turn with the insert, and are not scaled by it
-            self._count(1)
+            self._count(50)
             dx, dy = k % columns * _number(body, 44), k // columns * _number(body, 45)
             at = place + np.array([c * dx - s * dy, s * dx + c * dy])
             self.take(entities, np.column_stack((m[:, :2] @ turn, m[:, :2] @ at + m[:, 2])), layer, depth + 1)

@@ -136,7 +136,7 @@ class _Reader:
         self.passed_over: dict[str, int] = {}
         self.rules = _hiding_rules(root)
         self.by_id = {element.get("id"): element for element in root.iter() if element.get("id")}
-        self.taken = 0  # points so far; an element counts as one, a clone as twenty
+        self.taken = 0  # points so far; an element counts as one, a clone as fifty
         self.cloned: list[ElementTree.Element] = []  # what the clones show that are being drawn
 
     def is_shown(self, element: ElementTree.Element, visible: bool) -> bool | None:
@@ -196,7 +196,7 @@ class _Reader:
             if target is None or target in self.cloned:
                 self._pass_over("a clone of what is not in the file, or of itself")
                 return
-            self._count(20)
+            self._count(50)
             self.cloned.append(target)
             at = [_length(element.get(key), self.name, _MM["px"], size) for key, size in zip("xy", view, strict=True)]
             moved = _times(matrix, np.array([[1.0, 0.0, at[0]], [0.0, 1.0, at[1]]]))
