@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rds.nc.language.expressions import Fault, whole
-from rds.nc.language.outside import FANUC_CONTOUR, no_such_g, no_such_m
+from rds.nc.language.outside import EXTRUDER, FANUC_CONTOUR, no_such_g, no_such_m
 from rds.nc.language.state import NO_MOTION, XY, State
 
 AXES = "xyzabc"
@@ -284,6 +284,8 @@ def check(block: Block, state: State) -> None:
             )
         if not used and letter == "p" and turning:
             raise Fault(f"P {FANUC_CONTOUR}", letter)
+        if not used and letter == "e" and motion in (0, 10, 20, 30):
+            raise Fault(EXTRUDER, letter)
         if not used:
             raise Fault(f"nothing on the line uses {letter.upper()}; it goes with {by}", letter)
     if "@" in words or "^" in words:

@@ -199,7 +199,10 @@ class Reader:
             name = self.name()
             found = self.parameters.find(name)
             if found is None:
-                raise Fault(f"the parameter #<{name}> has no value; set it before with #<{name}> = ...", at=at)
+                where = (
+                    " (LinuxCNC takes it from its INI file, which is not read here)" if name.startswith("_ini[") else ""
+                )
+                raise Fault(f"the parameter #<{name}> has no value{where}; set it before with #<{name}> = ...", at=at)
             return found
         index = self.integer()
         try:

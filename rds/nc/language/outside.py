@@ -13,6 +13,9 @@ _G = {
     160: "G16 begins polar coordinates of other controls; write radius and angle as @ and ^, or X and Y",
     **dict.fromkeys((171, 181, 191), "there are no axes U, V, W; use G17, G18 or G19"),
     270: "G27 checks the reference point of other controls; leave it away",
+    282: "G28.2 homes the axes of TinyG and g2; home the machine before the program, and leave it away",
+    283: "G28.3 sets the position of TinyG and g2; write G92, or G10 L20 P0",
+    284: "G28.4 homes the axes of TinyG and g2; home the machine before the program, and leave it away",
     290: "G29 goes back from the reference point on other controls; write the position with G0",
     310: "G31 is the skip (probing) of other controls; write G38.2",
     320: "G32 cuts a thread on other controls; write G33 with K, the way for each turn",
@@ -32,6 +35,8 @@ _M = {
     10: "M10 clamps an axis on other controls; leave it away",
     11: "M11 releases an axis on other controls; leave it away",
     97: "M97 calls part of a program on other controls; write O<name> CALL",
+    82: "M82 counts the filament of 3-D printers absolutely; let a CAM program write the part for a mill",
+    83: "M83 counts the filament of 3-D printers from move to move; let a CAM program write the part for a mill",
     98: "M98 stands first on its line; write M98 P and the program's number on a line of its own",
 }
 _LETTERS = {
@@ -61,6 +66,10 @@ FANUC_MACRO = (
 )
 OLD_LINE_ENDS = "its lines end with CR alone, so that they are one; save the file with line ends LF, or CR LF"
 
+EXTRUDER = (
+    "E on a move is the filament of a 3-D printer, which no machine here has; let a CAM program write the part for a"
+    " mill"
+)
 GR_IS_OFF = (
     "GR, the subroutine call of dcs-thesis, is an option of the dialect; switch it on (`--with gr`)"
     " or write O<name> CALL"
@@ -78,7 +87,7 @@ def no_such_m(code: int) -> str:
     if code < 0:
         return f"M{code} is negative; M words are not"
     if 100 <= code <= 199:
-        return "user-defined M words are outside this dialect; leave it away"
+        return "user-defined M words, and those of 3-D printers, are outside this dialect; leave it away"
     return _M.get(code, f"there is no M{code}; correct the word or leave it away")
 
 

@@ -2,19 +2,40 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from itertools import pairwise
-from math import atan, atan2, cos, hypot, pi, radians, sin
+from math import atan, atan2, cos, hypot, isfinite, pi, radians, sin
 from pathlib import Path
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.limits import read_limited
-from rds.nc.shapes.curves import CHORD_ERROR, Curve, Drawing, arc_points, circle_curve, joined, polyline_curve, steps_of
+from rds.nc.shapes.curves import (
+    CHORD_ERROR,
+    MOST_POINTS,
+    Curve,
+    Drawing,
+    arc_points,
+    circle_curve,
+    joined,
+    polyline_curve,
+    steps_of,
+)
 
 _LARGEST = 128 << 20  # bytes
-_MM = {1: 25.4, 2: 304.8, 4: 1.0, 5: 10.0, 6: 1000.0, 13: 0.001}  # by $INSUNITS
+_MM = {
+    1: 25.4,
+    2: 304.8,
+    4: 1.0,
+    5: 10.0,
+    6: 1000.0,
+    8: 25.4e-6,
+    9: 0.0254,
+    10: 914.4,
+    13: 0.001,
+    14: 100.0,
+}  # $INSUNITS
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 _PASSED_OVER = {
     **dict.fromkeys(
@@ -24,6 +45,10 @@ _PASSED_OVER = {
     "HATCH": "hatches",
 }
 DEEPEST = 16  # blocks within one another
+_CODE_PAGE = re.compile(rb"\$DWGCODEPAGE\s+3\s+ANSI_([0-9]+)")
+_ESCAPED = re.compile(r"\\U\+([0-9A-Fa-f]{4})")
+_MESH, _FRAME, _SPACE = 16 | 64, 16, 8  # flags of a POLYLINE and of its VERTEX: meshes, control points, in space
+_IN_SPACE = ("LINE", "POINT", "ELLIPSE", "SPLINE")  # their places are those of the drawing, whatever their extrusion
 Pairs = list[tuple[int, str]]
 
 
@@ -32,7 +57,8 @@ def read_dxf(path: Path, unit: str | None = None) -> Drawing:
 
     Lengths are in the unit that the header names ($INSUNITS), or in `unit` (mm, cm, m or in), which has to be given
     where it names none. Lines and arcs of a layer whose ends meet become one curve. Text, dimensions and hatches are
-    passed over and told; so is what is on layers that are switched off. InputError for what is no such file.
+    passed over and told; so is what is hidden, on layers that are switched off, on the paper's sheets, or tilted out of
+    the plane. InputError for what is no such file.
     """
     name = str(path)
     if unit is not None and unit not in UNITS:
@@ -43,7 +69,7 @@ def read_dxf(path: Path, unit: str | None = None) -> Drawing:
         raise InputError(f"cannot be read: {error.strerror or error}; name a drawing", name) from error
     if data.startswith(b"AutoCAD Binary DXF"):
         raise InputError("is a binary DXF; save it as ASCII DXF (R12 or later)", name)
-    pairs = _pairs(data.decode("utf-8", "replace"), name)
+    pairs = _pairs(_decoded(data), name)
     sections = _sections(pairs)
     if "ENTITIES" not in sections:
         raise InputError("has no ENTITIES section; save it as ASCII DXF (R12 or later)", name)
@@ -54,14 +80,29 @@ def read_dxf(path: Path, unit: str | None = None) -> Drawing:
     return Drawing(joined(reader.curves), name, notes)
 
 
+def _decoded(data: bytes) -> str:
+    """The text: UTF-8 since 2007, before that in the code page that the header names."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        page = _CODE_PAGE.search(data)
+        try:
+            text = data.decode(f"cp{page[1].decode()}" if page else "cp1252", "replace")
+        except LookupError:
+            text = data.decode("cp1252", "replace")
+    return _ESCAPED.sub(lambda match: chr(int(match[1], 16)), text)
+
+
 def _pairs(text: str, name: str) -> Pairs:
-    lines = text.splitlines()
+    lines = re.split(r"\r\n?|\n", text)  # not splitlines(): texts may have other separators in them
     found: Pairs = []
     for k in range(0, len(lines) - 1, 2):
         code = lines[k].strip()
-        if not code.lstrip("-").isdigit():
+        if not re.fullmatch("-?[0-9]{1,5}", code):
             raise InputError(f"{code[:40]!r} is no group code; save it as ASCII DXF (R12 or later)", f"{name}:{k + 1}")
         found.append((int(code), lines[k + 1].strip()))
+        if found[-1] == (0, "EOF"):
+            break
     if not found:
         raise InputError("is empty; save it as ASCII DXF (R12 or later)", name)
     return found
@@ -83,11 +124,14 @@ def _sections(pairs: Pairs) -> dict[str, Pairs]:
 def _scale(header: Pairs, name: str) -> float:
     for k, (code, value) in enumerate(header):
         if code == 9 and value == "$INSUNITS" and k + 1 < len(header):
-            units = int(header[k + 1][1])
+            units = int(_number([header[k + 1]], header[k + 1][0]))
             if units in _MM:
                 return _MM[units]
             if units:
-                raise InputError(f"$INSUNITS = {units} is no unit of drawings of parts; save it in mm or inch", name)
+                raise InputError(
+                    f"$INSUNITS = {units} is no unit of drawings of parts; give its unit (unit: mm, cm, m or in)",
+                    name,
+                )
     raise InputError("does not say its unit ($INSUNITS); give it (unit: mm, cm, m or in)", name)
 
 
@@ -111,7 +155,7 @@ def _blocks(pairs: Pairs) -> dict[str, tuple[tuple[float, float], list[tuple[str
         if kind == "BLOCK":
             inside = []
             base = (_number(body, 10, 0.0), _number(body, 20, 0.0))
-            found[_text(body, 2)] = (base, inside)
+            found[_text(body, 2).lower()] = (base, inside)  # names of DXF differ by more than their case
         elif kind == "ENDBLK":
             inside = None
         elif inside is not None:
@@ -120,9 +164,9 @@ def _blocks(pairs: Pairs) -> dict[str, tuple[tuple[float, float], list[tuple[str
 
 
 def _off(tables: Pairs) -> set[str]:
-    """Layers that are switched off or frozen."""
+    """Layers that are switched off or frozen, in lower case."""
     return {
-        _text(body, 2)
+        _text(body, 2).lower()
         for kind, body in _entities(tables)
         if kind == "LAYER" and (_number(body, 62, 7.0) < 0 or int(_number(body, 70, 0.0)) & 1)
     }
@@ -134,14 +178,38 @@ def _text(body: Pairs, code: int, default: str = "") -> str:
 
 def _number(body: Pairs, code: int, default: float = 0.0) -> float:
     text = _text(body, code)
+    return _value(code, text) if text else default
+
+
+def _value(code: int, text: str) -> float:
     try:
-        return float(text) if text else default
+        value = float(text)
     except ValueError:
-        raise InputError(f"group {code} of a DXF entity is {text[:40]!r}, not a number") from None
+        value = float("nan")
+    if not isfinite(value):
+        raise InputError(f"group {code} of a DXF entity is {text[:40]!r}, not a number; save the drawing again")
+    return value
 
 
 def _all(body: Pairs, code: int) -> list[float]:
-    return [float(value) for key, value in body if key == code]
+    return [_value(code, value) for key, value in body if key == code]
+
+
+def _places(body: Pairs, code: int) -> np.ndarray:
+    """The places x, y in the groups `code` and `code` + 10; none where there are not as many of both."""
+    x, y = _all(body, code), _all(body, code + 10)
+    return np.column_stack((x, y)) if len(x) == len(y) else np.empty((0, 2))
+
+
+def _sweep(first: float, last: float) -> float:
+    """From one angle to the next, rad: a whole turn where they are equal, which programs write with a rounding."""
+    sweep = (last - first) % (2 * pi)
+    return sweep if 1e-6 < sweep < 2 * pi - 1e-6 else 2 * pi
+
+
+def _size(m: np.ndarray) -> float:
+    """How many mm a unit of the entity becomes at most: its curves have chords for that size."""
+    return float(np.linalg.norm(m[:, :2], 2))
 
 
 class _Reader:
@@ -149,64 +217,90 @@ class _Reader:
         self.name, self.scale, self.blocks, self.off = name, scale, blocks, off
         self.curves: list[Curve] = []
         self.passed_over: dict[str, int] = {}
+        self.taken = 0  # points of the curves so far; an insert counts as fifty
 
     def _pass_over(self, what: str) -> None:
         self.passed_over[what] = self.passed_over.get(what, 0) + 1
+
+    def _count(self, more: int) -> None:
+        self.taken += more
+        if self.taken > MOST_POINTS:
+            raise InputError(
+                f"has more than {MOST_POINTS} points, blocks included; leave out what is not cut", self.name
+            )
 
     def take(
         self, entities: Iterator[tuple[str, Pairs]] | list[tuple[str, Pairs]], m: np.ndarray, on: str | None, depth: int
     ) -> None:
         """Entities under the transformation m (2 × 3, to mm); `on`: the layer of the insert, for what is on layer 0."""
-        vertices: list[tuple[float, float, float]] | None = None
-        closed, poly_layer = False, ""
+        line, line_layer = None, ""  # type: Pairs | None, str  # a POLYLINE, whose VERTEX entities follow it
+        vertices: list[tuple[float, float, float]] = []
         for kind, body in entities:
             layer = _text(body, 8, "0")
             layer = on if on is not None and layer == "0" else layer
-            if kind == "POLYLINE":
-                vertices, closed, poly_layer = [], bool(int(_number(body, 70)) & 1), layer
-            elif kind == "VERTEX" and vertices is not None:
-                vertices.append((_number(body, 10), _number(body, 20), _number(body, 42)))
+            if kind == "VERTEX":
+                if line is not None and not int(_number(body, 70)) & _FRAME:
+                    vertices.append((_number(body, 10), _number(body, 20), _number(body, 42)))
             elif kind == "SEQEND":
-                if vertices:
-                    self._add(_bulged(vertices, closed, self.scale), closed, poly_layer, m)
-                vertices = None
-            elif layer in self.off:
+                if line is not None and vertices:
+                    self._polyline(vertices, line, line_layer, m)
+                line = None
+            elif layer.lower() in self.off:
                 self._pass_over("objects of hidden layers")
+            elif int(_number(body, 67)) == 1:
+                if kind != "VIEWPORT":
+                    self._pass_over("objects on sheets of paper (draw in model space what is to be cut)")
+            elif int(_number(body, 60)) == 1:
+                self._pass_over("hidden objects")
+            elif kind not in _IN_SPACE and self._tilted(kind, body):
+                self._pass_over("objects that do not lie in the plane XY")
+            elif kind == "POLYLINE":
+                if int(_number(body, 70)) & _MESH:
+                    self._pass_over("meshes")
+                else:
+                    line, vertices, line_layer = body, [], layer
             else:
                 self._entity(kind, body, layer, m, depth)
 
+    def _tilted(self, kind: str, body: Pairs) -> bool:
+        if kind == "POLYLINE" and int(_number(body, 70)) & _SPACE:
+            return False
+        return hypot(_number(body, 210), _number(body, 220)) > 1e-6
+
+    def _polyline(self, vertices: list[tuple[float, float, float]], body: Pairs, layer: str, m: np.ndarray) -> None:
+        flags = int(_number(body, 70))
+        m = m if flags & _SPACE else _mirrored(body, m)
+        self._add(_bulged(vertices, bool(flags & 1), _size(m)), bool(flags & 1), layer, m)
+
     def _entity(self, kind: str, body: Pairs, layer: str, m: np.ndarray, depth: int) -> None:
         x, y = _number(body, 10), _number(body, 20)
-        mirror = -1.0 if _number(body, 230, 1.0) < 0 else 1.0  # an extrusion downwards mirrors X
-        if mirror < 0:
-            m = np.column_stack((m[:, 0] * -1.0, m[:, 1], m[:, 2])) if kind not in ("LINE", "ELLIPSE", "SPLINE") else m
+        if kind not in _IN_SPACE:
+            m = _mirrored(body, m)
         if kind == "LINE":
             self._add(np.array([[x, y], [_number(body, 11), _number(body, 21)]]), False, layer, m)
         elif kind == "POINT":
             self._circle(x, y, 0.0, layer, m)
         elif kind == "CIRCLE":
-            self._circle(x, y, _number(body, 40), layer, m)
+            self._circle(x, y, abs(_number(body, 40)), layer, m)
         elif kind == "ARC":
             first, last = radians(_number(body, 50)), radians(_number(body, 51))
-            r = _number(body, 40)
-            sweep = (last - first) % (2 * pi) or 2 * pi
-            self._add(
-                arc_points(x * self.scale, y * self.scale, r * self.scale, first, sweep) / self.scale, False, layer, m
-            )
+            self._add(_arc(x, y, _number(body, 40), first, _sweep(first, last), _size(m)), False, layer, m)
         elif kind == "LWPOLYLINE":
             closed = bool(int(_number(body, 70)) & 1)
-            self._add(_bulged(_lightweight(body), closed, self.scale), closed, layer, m)
+            self._add(_bulged(_lightweight(body), closed, _size(m)), closed, layer, m)
         elif kind == "ELLIPSE":
-            self._add(_ellipse(body, self.scale), False, layer, m)
+            self._add(_ellipse(body, _size(m)), False, layer, m)
         elif kind == "SPLINE":
-            self._add(_spline(body, self.scale, self.name), bool(int(_number(body, 70)) & 1), layer, m)
+            self._add(_spline(body, _size(m), self.name), bool(int(_number(body, 70)) & 1), layer, m)
+            if not len(_places(body, 10)):
+                self._pass_over("the shape of a spline with fit points alone: straight lines go through them")
         elif kind == "INSERT":
             self._insert(body, layer, m, depth)
         else:
             self._pass_over(_PASSED_OVER.get(kind, f"{kind} (no curve of the plane)"))
 
     def _insert(self, body: Pairs, layer: str, m: np.ndarray, depth: int) -> None:
-        block = self.blocks.get(_text(body, 2))
+        block = self.blocks.get(_text(body, 2).lower())
         if block is None or depth >= DEEPEST:
             self._pass_over("inserts of blocks that are not in the file")
             return
@@ -215,7 +309,12 @@ class _Reader:
         c, s = cos(angle), sin(angle)
         turn = np.array([[c * sx, -s * sy], [s * sx, c * sy]])
         place = np.array([_number(body, 10), _number(body, 20)]) - turn @ np.array([bx, by])
-        self.take(entities, np.column_stack((m[:, :2] @ turn, m[:, :2] @ place + m[:, 2])), layer, depth + 1)
+        columns, rows = (max(int(_number(body, code, 1.0)), 1) for code in (70, 71))
+        for k in range(columns * rows):  # an array: its distances turn with the insert, and are not scaled by it
+            self._count(50)
+            dx, dy = k % columns * _number(body, 44), k // columns * _number(body, 45)
+            at = place + np.array([c * dx - s * dy, s * dx + c * dy])
+            self.take(entities, np.column_stack((m[:, :2] @ turn, m[:, :2] @ at + m[:, 2])), layer, depth + 1)
 
     def _circle(self, x: float, y: float, r: float, layer: str, m: np.ndarray) -> None:
         a = m[:, :2]
@@ -223,22 +322,33 @@ class _Reader:
         if np.allclose(a.T @ a, size**2 * np.eye(2), rtol=1e-9, atol=1e-12):
             cx, cy = a @ (x, y) + m[:, 2]
             self.curves.append(circle_curve(float(cx), float(cy), r * size, layer))
+            self._count(len(self.curves[-1].points))
         else:
-            self._add(arc_points(x, y, r, 0.0, 2 * pi), True, layer, m)
+            self._add(_arc(x, y, r, 0.0, 2 * pi, _size(m)), True, layer, m)
 
     def _add(self, points: np.ndarray, closed: bool, layer: str, m: np.ndarray) -> None:
+        self._count(len(points))
         curve = polyline_curve(points @ m[:, :2].T + m[:, 2], closed, layer)
         if curve is not None:
             self.curves.append(curve)
+
+
+def _mirrored(body: Pairs, m: np.ndarray) -> np.ndarray:
+    """m for an entity in a plane of its own: one that is seen from below (its extrusion goes down) has X mirrored."""
+    return np.column_stack((-m[:, 0], m[:, 1:])) if _number(body, 230, 1.0) < 0 else m
+
+
+def _arc(x: float, y: float, r: float, first: float, sweep: float, size: float) -> np.ndarray:
+    return arc_points(x * size, y * size, abs(r) * size, first, sweep) / size if size else np.empty((0, 2))
 
 
 def _lightweight(body: Pairs) -> list[tuple[float, float, float]]:
     found: list[list[float]] = []
     for code, value in body:
         if code == 10:
-            found.append([float(value), 0.0, 0.0])
+            found.append([_value(code, value), 0.0, 0.0])
         elif code in (20, 42) and found:
-            found[-1][1 if code == 20 else 2] = float(value)
+            found[-1][1 if code == 20 else 2] = _value(code, value)
     return [(x, y, bulge) for x, y, bulge in found]
 
 
@@ -271,7 +381,7 @@ def _ellipse(body: Pairs, scale: float) -> np.ndarray:
     ratio, first, last = _number(body, 40, 1.0), _number(body, 41), _number(body, 42, 2 * pi)
     if _number(body, 230, 1.0) < 0:
         ratio = -ratio
-    sweep = (last - first) % (2 * pi) or 2 * pi
+    sweep = _sweep(first, last)
     angle = first + np.linspace(0.0, sweep, steps_of(hypot(mx, my) * scale, sweep) + 1)
     c, s = np.cos(angle), np.sin(angle)
     return np.column_stack((x + c * mx - s * ratio * my, y + c * my + s * ratio * mx))
@@ -281,26 +391,25 @@ def _spline(body: Pairs, scale: float, name: str) -> np.ndarray:
     """A (rational) B-spline by de Boor's recursion; one of fit points alone as lines through them."""
     degree = int(_number(body, 71, 3.0))
     knots, weights = np.array(_all(body, 40)), np.array(_all(body, 41))
-    control = np.column_stack((_all(body, 10), _all(body, 20)))
+    control, fit = _places(body, 10), _places(body, 11)
     n = len(control)
-    if n == 0 and _all(body, 11):
-        return np.column_stack((_all(body, 11), _all(body, 21)))
-    if n <= degree or len(knots) != n + degree + 1 or (len(weights) not in (0, n)):
+    if n == 0 and len(fit):
+        return fit
+    if n <= degree or degree < 1 or len(knots) != n + degree + 1 or (len(weights) not in (0, n)):
         raise InputError("a spline's knots and control points do not belong together; explode it into lines", name)
     w = weights if len(weights) else np.ones(n)
     rows = np.column_stack((control * w[:, None], w))
     spans = np.unique(knots[degree : n + 1])
     bend = np.abs(np.diff(control, n=2, axis=0)).max() * scale if n > 2 else 0.0
     per_span = int(min(max(np.ceil(np.sqrt(degree * degree * bend / (8 * CHORD_ERROR))), 2), 2000))
-    parts = [np.linspace(a, b, per_span, endpoint=False) for a, b in pairwise(spans)]
-    found = []
-    for u in np.append(np.concatenate(parts), spans[-1]):
-        k = int(np.clip(np.searchsorted(knots, u, side="right") - 1, degree, n - 1))
-        d = rows[k - degree : k + 1].copy()
-        for r in range(1, degree + 1):
-            for j in range(degree, r - 1, -1):
-                low, high = knots[j + k - degree], knots[j + 1 + k - r]
-                share = (u - low) / (high - low) if high > low else 0.0
-                d[j] = (1 - share) * d[j - 1] + share * d[j]
-        found.append(d[degree, :2] / d[degree, 2])
-    return np.array(found)
+    u = np.append((spans[:-1, None] + np.diff(spans)[:, None] * np.arange(per_span) / per_span).ravel(), spans[-1])
+    k = np.clip(np.searchsorted(knots, u, side="right") - 1, degree, n - 1)
+    d = [rows[k - degree + j] for j in range(degree + 1)]
+    for r in range(1, degree + 1):
+        for j in range(degree, r - 1, -1):
+            low, high = knots[j + k - degree], knots[j + 1 + k - r]
+            width = high - low
+            share = np.divide(u - low, width, out=np.zeros_like(u), where=width > 0)[:, None]
+            d[j] = (1 - share) * d[j - 1] + share * d[j]
+    found: np.ndarray = d[degree][:, :2] / d[degree][:, 2:]
+    return found

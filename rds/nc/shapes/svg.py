@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from math import cos, radians, sin, tan
+from math import cos, hypot, radians, sin, sqrt, tan
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,31 +12,36 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.limits import read_limited
-from rds.nc.shapes.curves import CHORD_ERROR, Curve, Drawing, circle_curve, joined, polyline_curve
+from rds.nc.shapes.curves import CHORD_ERROR, MOST_POINTS, Curve, Drawing, circle_curve, joined, polyline_curve
 from rds.nc.shapes.svg_path import polylines
 
 _LARGEST = 64 << 20  # bytes
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
-_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "px": 25.4 / 96, "": 25.4 / 96}
-_LENGTH = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|in|pt|pc|px|%|)\s*")
+_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "px": 25.4 / 96, "": 25.4 / 96, "Q": 0.25}
+_LENGTH = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|in|pt|pc|px|Q|%|)\s*")
 _TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _PASSED_OVER = {
     "text": "text (Path > Object to Path in Inkscape makes curves of it)",
     "image": "a pixel image (`rds nc make outline` traces one)",
-    "use": "a clone (Edit > Clone > Unlink in Inkscape makes a shape of it)",
     "foreignObject": "foreign content",
 }
+_XLINK = "{http://www.w3.org/1999/xlink}"
+_RULE = re.compile(r"([^{}]+)\{([^{}]*)\}")
+_ASPECT = re.compile(r"x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?")
+_SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}  # of the room that is left, before the drawing
 _NOT_DRAWN = ("defs", "metadata", "clipPath", "mask", "marker", "pattern", "symbol", "style", "title", "desc")
 DEEPEST = 100  # groups within one another
 Matrix = np.ndarray  # 2 × 3
+View = tuple[float, float]  # what per cent are of, in user units
 
 
 def read_svg(path: Path) -> Drawing:
     """The curves of an SVG file. Its size and viewBox say what is a mm; without a unit a user unit is 1/96 inch.
 
     The layer of a curve is the label of the Inkscape layer that it is in, or the id of its outermost group with one.
-    What is hidden, and text and images, is passed over and told. InputError for what is no SVG.
+    What is hidden, and text and images, is passed over and told; what is clipped or masked is drawn whole, and told.
+    InputError for what is no SVG.
     """
     name = str(path)
     try:
@@ -51,74 +56,188 @@ def read_svg(path: Path) -> Drawing:
         raise InputError(f"is no SVG: {error}; save it as plain SVG", name) from error
     if _tag(root) != "svg":
         raise InputError(f"is XML, but its first element is <{_tag(root)}>, not <svg>; save it as plain SVG", name)
-    reader = _Reader(name)
-    reader.walk(root, _to_mm(root, name), "", 0)
+    reader = _Reader(name, root)
+    matrix, view = _page(root, name)
+    for child in root if reader.is_shown(root, True) else ():
+        reader.walk(child, matrix, "", 0, view)
     notes = [f"passed over: {count} × {what}" for what, count in reader.passed_over.items()]
     return Drawing(joined(reader.curves), name, notes)
 
 
-def _to_mm(root: ElementTree.Element, name: str) -> Matrix:
-    """From user units to mm with Y upwards and the lower left corner of the page at 0."""
-    box = [float(value) for value in _NUMBER.findall(root.get("viewBox", ""))]
+def _page(root: ElementTree.Element, name: str) -> tuple[Matrix, View]:
+    """From user units to mm with Y upwards and the lower left corner of the page at 0; the size in user units."""
+    box, px = _box(root), _MM["px"]
     width, height = (_length(root.get(side), name) for side in ("width", "height"))
-    if len(box) == 4 and box[2] > 0 and box[3] > 0:
-        x = width / box[2] if width else (height / box[3] if height else _MM["px"])
-        y = height / box[3] if height else x
-        return np.array([[x, 0.0, -box[0] * x], [0.0, -y, (box[1] + box[3]) * y]])
-    scale = _MM["px"]
-    return np.array([[scale, 0.0, 0.0], [0.0, -scale, height or 0.0]])
+    if box is None:
+        return np.array([[px, 0.0, 0.0], [0.0, -px, height or 0.0]]), (width / px, height / px)
+    if not (width and height):
+        scale = width / box[2] if width else (height / box[3] if height else px)
+        width, height = width or box[2] * scale, height or box[3] * scale
+    fitted = _fitted(box, width, height, root)
+    return np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]) @ np.vstack((fitted, [0, 0, 1])) + [
+        [0, 0, 0],
+        [0, 0, height],
+    ], (box[2], box[3])
 
 
-def _length(text: str | None, name: str, per_unit: float | None = None) -> float:
-    """mm, or user units where `per_unit` (mm for each) is given; 0 where there is none, or per cent."""
-    if text is None:
+def _box(element: ElementTree.Element) -> list[float] | None:
+    box = [float(value) for value in _NUMBER.findall(element.get("viewBox", ""))]
+    return box if len(box) == 4 and box[2] > 0 and box[3] > 0 else None
+
+
+def _fitted(box: list[float], width: float, height: float, element: ElementTree.Element) -> Matrix:
+    """From a viewBox to a rectangle of this size, as preserveAspectRatio says: in its middle, unless told otherwise."""
+    x, y = width / box[2], height / box[3]
+    aspect = element.get("preserveAspectRatio", "").strip()
+    if aspect == "none":
+        return np.array([[x, 0.0, -box[0] * x], [0.0, y, -box[1] * y]])
+    match = _ASPECT.match(aspect)
+    right, down, how = match.groups() if match else ("Mid", "Mid", None)
+    scale = max(x, y) if how == "slice" else min(x, y)
+    dx, dy = _SHARE[right] * (width - box[2] * scale), _SHARE[down] * (height - box[3] * scale)
+    return np.array([[scale, 0.0, dx - box[0] * scale], [0.0, scale, dy - box[1] * scale]])
+
+
+def _length(text: str | None, name: str, per_unit: float | None = None, whole: float = 0.0) -> float:
+    """mm, or user units where `per_unit` (mm for each) is given; 0 where there is none. `whole`: of per cent."""
+    if text is None or text.strip() == "auto":
         return 0.0
     match = _LENGTH.fullmatch(text)
     if match is None:
         raise InputError(f"{text!r} is no length; write a number with mm, cm, in, pt, pc or px", name)
     if match[2] == "%":
-        return 0.0
+        return float(match[1]) / 100.0 * whole
     if per_unit is None:
         return float(match[1]) * _MM[match[2]]
     return float(match[1]) * (1.0 if match[2] in ("", "px") else _MM[match[2]] / _MM["px"])
 
 
+def _hiding_rules(root: ElementTree.Element) -> dict[str, dict[str, str]]:
+    """What style sheets in the file say of display and visibility: by `.class`, `#id` or name of the element."""
+    found: dict[str, dict[str, str]] = {}
+    for element in root.iter():
+        if _tag(element) == "style":
+            for selectors, body in _RULE.findall(re.sub(r"/\*.*?\*/", "", element.text or "", flags=re.DOTALL)):
+                said = {key: value for key, value in _declared(body).items() if key in ("display", "visibility")}
+                for selector in selectors.split(",") if said else ():
+                    found.setdefault(selector.strip(), {}).update(said)
+    return found
+
+
+def _declared(style: str) -> dict[str, str]:
+    pairs = (part.split(":", 1) for part in style.split(";") if ":" in part)
+    return {key.strip(): value.replace("!important", "").strip() for key, value in pairs}
+
+
 class _Reader:
-    def __init__(self, name: str):
+    def __init__(self, name: str, root: ElementTree.Element):
         self.name = name
         self.curves: list[Curve] = []
         self.passed_over: dict[str, int] = {}
+        self.rules = _hiding_rules(root)
+        self.by_id = {element.get("id"): element for element in root.iter() if element.get("id")}
+        self.taken = 0  # points so far; an element counts as one, a clone as fifty
+        self.cloned: list[ElementTree.Element] = []  # what the clones show that are being drawn
 
-    def walk(self, element: ElementTree.Element, matrix: Matrix, layer: str, depth: int) -> None:
+    def is_shown(self, element: ElementTree.Element, visible: bool) -> bool | None:
+        """Whether an element is visible, as what it is in is unless it says otherwise; None: nor anything within it."""
+        said = {key: element.get(key, "") for key in ("display", "visibility") if element.get(key)}
+        for selector in (_tag(element), *(f".{word}" for word in element.get("class", "").split())):
+            said |= self.rules.get(selector, {})
+        said |= self.rules.get(f"#{element.get('id')}", {})
+        style = _declared(element.get("style", ""))
+        said |= {key: value for key, value in style.items() if key in said or key in ("display", "visibility")}
+        if said.get("display") == "none":
+            return None
+        visibility = said.get("visibility", "inherit")
+        return visible if visibility == "inherit" else visibility == "visible"
+
+    def walk(
+        self,
+        element: ElementTree.Element,
+        matrix: Matrix,
+        layer: str,
+        depth: int,
+        view: View,
+        visible: bool = True,
+        use: ElementTree.Element | None = None,
+    ) -> None:
+        """The curves of an element and of those within it; `use`: the clone that it is drawn for."""
         tag = _tag(element)
-        if tag in _NOT_DRAWN or depth > DEEPEST:
+        if (tag in _NOT_DRAWN and not (use is not None and tag == "symbol")) or depth > DEEPEST:
             return
-        style = dict(part.split(":", 1) for part in element.get("style", "").split(";") if ":" in part)
-        shown = {key.strip(): value.strip() for key, value in style.items()}
-        if shown.get("display", element.get("display")) == "none":
+        self._count(1)
+        shown = self.is_shown(element, visible)
+        if shown is None or (not shown and not len(element)):
             self._pass_over("hidden objects")
             return
         if tag in _PASSED_OVER:
             self._pass_over(_PASSED_OVER[tag])
             return
+        style = _declared(element.get("style", ""))
+        if any((style.get(key) or element.get(key) or "none") != "none" for key in ("clip-path", "mask")):
+            self._pass_over("a clip or mask: its object is drawn whole (Object > Clip > Release, Path > Intersection)")
+        if style.get("transform", "none") != "none" or element.get("transform-origin"):
+            self._pass_over(
+                "a transformation by CSS (transform-origin, or transform in a style); write it as transform="
+            )
         if element.get("transform"):
             matrix = _times(matrix, _transform(element.get("transform", ""), self.name))
-        if tag in ("g", "a", "svg", "switch"):
+        if tag in ("svg", "symbol"):
+            matrix, view = self._nested(element, matrix, view, use)
+        if tag in ("g", "a", "svg", "switch", "symbol"):
             label = element.get(f"{_INKSCAPE}label") if element.get(f"{_INKSCAPE}groupmode") == "layer" else None
             inner = label or layer or (element.get("id") or "" if tag == "g" else "")
             for child in element:
-                self.walk(child, matrix, inner, depth + 1)
+                self.walk(child, matrix, inner, depth + 1, view, shown)
             return
-        for points, closed, circle in self._shape(tag, element, matrix):
+        if tag == "use":
+            target = self.by_id.get((element.get("href") or element.get(f"{_XLINK}href") or "").strip().lstrip("#"))
+            if target is None or target in self.cloned:
+                self._pass_over("a clone of what is not in the file, or of itself")
+                return
+            self._count(50)
+            self.cloned.append(target)
+            at = [_length(element.get(key), self.name, _MM["px"], size) for key, size in zip("xy", view, strict=True)]
+            moved = _times(matrix, np.array([[1.0, 0.0, at[0]], [0.0, 1.0, at[1]]]))
+            self.walk(target, moved, layer, depth + 1, view, shown, use=element)
+            self.cloned.pop()
+            return
+        for points, closed, circle in self._shape(tag, element, matrix, view):
             curve = circle_curve(*circle, layer) if circle else polyline_curve(_moved(points, matrix), closed, layer)
             if curve is not None:
+                self._count(len(curve.points))
                 self.curves.append(curve)
+
+    def _count(self, more: int) -> None:
+        self.taken += more
+        if self.taken > MOST_POINTS:
+            raise InputError(
+                f"has more than {MOST_POINTS} points, clones included; leave out what is not cut", self.name
+            )
+
+    def _nested(
+        self, element: ElementTree.Element, matrix: Matrix, view: View, use: ElementTree.Element | None
+    ) -> tuple[Matrix, View]:
+        """What a drawing within the drawing is placed by, and its size in its own units; a clone may set its size."""
+
+        def number(key: str, whole: float) -> float:
+            own = element.get(key, "0" if key in "xy" else "100%")
+            given = own if use is None or key in "xy" else use.get(key, own)
+            return _length(given, self.name, _MM["px"], whole)
+
+        x, y, width, height = (number(key, view[k % 2]) for k, key in enumerate(("x", "y", "width", "height")))
+        matrix = _times(matrix, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
+        box = _box(element)
+        if box is None:
+            return matrix, (width, height)
+        return _times(matrix, _fitted(box, width, height, element)), (box[2], box[3])
 
     def _pass_over(self, what: str) -> None:
         self.passed_over[what] = self.passed_over.get(what, 0) + 1
 
     def _shape(
-        self, tag: str, element: ElementTree.Element, matrix: Matrix
+        self, tag: str, element: ElementTree.Element, matrix: Matrix, view: View
     ) -> Iterator[tuple[np.ndarray, bool, tuple[float, float, float] | None]]:
         """Points in user units, whether closed, and the circle in mm where it is one."""
         scale = float(np.sqrt(abs(np.linalg.det(matrix[:, :2])))) or 1.0
@@ -126,15 +245,22 @@ class _Reader:
         per_unit = _MM["px"]
 
         def number(key: str) -> float:
-            return _length(element.get(key), self.name, per_unit)
+            along = hypot(*view) / sqrt(2.0) if key == "r" else view["y" in key or key == "height"]
+            return _length(element.get(key), self.name, per_unit, along)
+
+        def radii() -> tuple[float, float]:
+            """rx and ry, of which one that is not given, or negative, is as the other."""
+            given = [number(key) if element.get(key, "auto").strip() != "auto" else -1.0 for key in ("rx", "ry")]
+            rx, ry = (given[k] if given[k] >= 0 else max(given[1 - k], 0.0) for k in (0, 1))
+            return rx, ry
 
         if tag == "path":
             for points, closed in polylines(element.get("d", ""), error, self.name):
                 yield points, closed, None
         elif tag == "rect":
             x, y, w, h = number("x"), number("y"), number("width"), number("height")
-            rx = min(number("rx") or number("ry"), w / 2)
-            ry = min(number("ry") or rx, h / 2)
+            rx, ry = radii()
+            rx, ry = (min(rx, w / 2), min(ry, h / 2)) if rx and ry else (0.0, 0.0)
             if w > 0 and h > 0:
                 d = f"M{x + rx} {y}H{x + w - rx}A{rx} {ry} 0 0 1 {x + w} {y + ry}V{y + h - ry}"
                 d += f"A{rx} {ry} 0 0 1 {x + w - rx} {y + h}H{x + rx}A{rx} {ry} 0 0 1 {x} {y + h - ry}V{y + ry}"
@@ -143,7 +269,7 @@ class _Reader:
                     yield points, closed, None
         elif tag in ("circle", "ellipse"):
             cx, cy = number("cx"), number("cy")
-            rx, ry = (number("r"),) * 2 if tag == "circle" else (number("rx"), number("ry"))
+            rx, ry = (number("r"),) * 2 if tag == "circle" else radii()
             if rx <= 0 or ry <= 0:
                 return
             a = matrix[:, :2]

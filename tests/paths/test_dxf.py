@@ -1,0 +1,160 @@
+"""DXF drawings as CAD programs write them: what counts, what is passed over and told, and where it lies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.core.errors import InputError
+from rds.nc.shapes.curves import Drawing
+from rds.nc.shapes.dxf import read_dxf
+
+Read = Callable[..., Drawing]
+HEADER = "0 SECTION 2 HEADER 9 $INSUNITS 70 4 0 ENDSEC"
+
+
+def section(name: str, *entities: str) -> str:
+    return f"0 SECTION 2 {name} {' '.join(entities)} 0 ENDSEC"
+
+
+def written(path: Path, *sections: str, end: str = "\n") -> Path:
+    """A file of groups, which stand here on one line: a code and its value, alternately."""
+    path.write_bytes((end.join(" ".join((HEADER, *sections, "0 EOF")).split()) + end).encode())
+    return path
+
+
+@pytest.fixture
+def drawn(tmp_path: Path) -> Read:
+    def read(*entities: str, blocks: str = "", tables: str = "") -> Drawing:
+        parts = [section("TABLES", tables), section("BLOCKS", blocks), section("ENTITIES", *entities)]
+        return read_dxf(written(tmp_path / "part.dxf", *parts))
+
+    return read
+
+
+def extent(drawing: Drawing) -> list[float]:
+    points = np.vstack([curve.points for curve in drawing.curves])
+    return [*points.min(axis=0), *points.max(axis=0)]
+
+
+@pytest.mark.parametrize("last", ["6.283185307179586", "6.283185307179587", "6.28318530717959", "6.283185"])
+def test_a_whole_ellipse_is_whole_however_its_end_is_rounded(drawn: Read, last: str) -> None:
+    drawing = drawn(f"0 ELLIPSE 8 a 10 5 20 0 11 4 21 0 40 0.5 41 0 42 {last}")
+    assert drawing.curves[0].closed
+    assert extent(drawing) == pytest.approx([1, -2, 9, 2], abs=1e-3)
+
+
+def test_an_arc_of_a_whole_turn_is_a_circle(drawn: Read) -> None:
+    drawing = drawn("0 ARC 8 a 10 0 20 0 40 3 50 0 51 360.00000000001")
+    assert extent(drawing) == pytest.approx([-3, -3, 3, 3], abs=1e-2)
+
+
+def test_an_insert_in_rows_and_columns_is_there_as_often(drawn: Read) -> None:
+    hole = "0 BLOCK 2 Hole 10 0 20 0 0 CIRCLE 8 0 10 0 20 0 40 1 0 ENDBLK"
+    array = "0 INSERT 8 a 2 HOLE 10 10 20 0 41 2 42 2 50 90 70 3 71 2 44 5 45 20"
+    places = np.array([curve.circle for curve in drawn(array, blocks=hole).curves])
+    expected = np.array([(10 - 20 * row, 5 * column, 2.0) for row in range(2) for column in range(3)])
+    assert places == pytest.approx(expected)
+
+
+def test_blocks_that_multiply_without_end_are_refused(drawn: Read) -> None:
+    blocks = "".join(
+        f" 0 BLOCK 2 b{k} 10 0 20 0 {f'0 INSERT 8 0 2 b{k + 1} ' * 10} 0 LINE 8 0 10 0 20 0 11 1 21 0 0 ENDBLK"
+        for k in range(12)
+    )
+    with pytest.raises(InputError, match="more than 2000000 points"):
+        drawn("0 INSERT 8 a 2 b0 70 30000 71 30000", blocks=blocks)
+
+
+LINE = "0 LINE 8 a 10 0 20 0 11 1 21 1"
+
+
+@pytest.mark.parametrize(
+    ("entity", "told"),
+    [
+        ("0 LINE 8 a 67 1 10 0 20 0 11 210 21 297", "on sheets of paper"),
+        ("0 LINE 8 a 60 1 10 0 20 0 11 9 21 9", "hidden objects"),
+        ("0 POLYLINE 8 Off 66 1 0 VERTEX 8 Off 10 9 20 9 0 VERTEX 8 Off 10 5 20 9 0 SEQEND", "hidden layers"),
+        ("0 LINE 8 OFF 10 0 20 0 11 9 21 9", "hidden layers"),
+        ("0 CIRCLE 8 a 10 5 20 5 40 3 210 1 220 0 230 0", "do not lie in the plane XY"),
+        ("0 POLYLINE 8 a 66 1 70 64 0 VERTEX 8 a 10 9 20 9 0 VERTEX 8 a 10 5 20 9 0 SEQEND", "meshes"),
+    ],
+)
+def test_what_is_not_part_of_the_drawing_is_passed_over_and_told(drawn: Read, entity: str, told: str) -> None:
+    drawing = drawn(entity, LINE, tables="0 LAYER 2 off 62 -7")
+    assert extent(drawing) == pytest.approx([0, 0, 1, 1])
+    assert told in " ".join(drawing.notes)
+
+
+def test_the_control_points_of_a_smoothed_polyline_are_no_corners(drawn: Read) -> None:
+    vertices = [(0, 0, 16), (5, 50, 16), (10, 0, 16), (0, 0, 8), (5, 10, 8), (10, 0, 8)]
+    rows = " ".join(f"0 VERTEX 8 a 10 {x} 20 {y} 70 {flag}" for x, y, flag in vertices)
+    assert extent(drawn(f"0 POLYLINE 8 a 66 1 70 4 {rows} 0 SEQEND")) == pytest.approx([0, 0, 10, 10])
+
+
+def test_what_is_seen_from_below_has_its_x_mirrored_where_its_places_are_its_planes(
+    drawn: Read,
+) -> None:
+    down = "210 0 220 0 230 -1"
+    line = f"0 POLYLINE 8 line 66 1 {down} 0 VERTEX 8 line 10 1 20 0 0 VERTEX 8 line 10 2 20 3 0 SEQEND"
+    drawing = drawn(line, f"0 POINT 8 point 10 4 20 5 {down}", f"0 CIRCLE 8 circle 10 4 20 5 40 1 {down}")
+    assert extent(Drawing(drawing.on("line"), "")) == pytest.approx([-2, 0, -1, 3])
+    assert drawing.on("point")[0].circle == pytest.approx((4, 5, 0))
+    assert drawing.on("circle")[0].circle == pytest.approx((-4, 5, 1))
+
+
+def test_curves_of_a_block_keep_within_the_chord_error_at_the_size_that_they_get(drawn: Read) -> None:
+    block = "0 BLOCK 2 b 10 0 20 0 0 LWPOLYLINE 8 0 70 1 10 -1 20 0 42 1 10 1 20 0 42 1 0 ENDBLK"
+    points = drawn("0 INSERT 8 a 2 b 10 0 20 0 41 50 42 50", blocks=block).curves[0].points
+    middles = (points + np.roll(points, -1, axis=0)) / 2
+    assert np.hypot(*middles.T) == pytest.approx(np.full(len(points), 50.0), abs=0.0021)
+    assert np.ptp(np.unwrap(np.arctan2(points[:, 1], points[:, 0]))) == pytest.approx(2 * pi, abs=0.1)
+
+
+def test_a_spline_of_fit_points_alone_is_told(drawn: Read) -> None:
+    drawing = drawn("0 SPLINE 8 a 70 8 71 3 74 3 11 0 21 0 11 5 21 5 11 9 21 0")
+    assert len(drawing.curves[0].points) == 3
+    assert "straight lines go through them" in " ".join(drawing.notes)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_line_ends_and_what_stands_behind_the_end_do_not_matter(tmp_path: Path, end: str) -> None:
+    path = written(tmp_path / "part.dxf", section("ENTITIES", LINE), end=end)
+    path.write_bytes(path.read_bytes() + f"kept{end}by somebody{end}".encode())
+    assert extent(read_dxf(path)) == pytest.approx([0, 0, 1, 1])
+
+
+def test_layers_have_their_names_in_old_code_pages_too(tmp_path: Path) -> None:
+    path = written(tmp_path / "part.dxf", section("ENTITIES", LINE.replace("8 a", "8 Außen")))
+    text = path.read_text(encoding="utf-8").replace("$INSUNITS", "$DWGCODEPAGE\n3\nANSI_1252\n9\n$INSUNITS")
+    path.write_bytes(text.encode("cp1252"))
+    assert read_dxf(path).layers == ["Außen"]
+    path.write_text(text.replace("Außen", "Au\\U+00DFen"))
+    assert read_dxf(path).layers == ["Außen"]
+
+
+def test_a_separator_within_a_text_does_not_shift_the_groups(tmp_path: Path) -> None:
+    path = written(tmp_path / "part.dxf", section("ENTITIES", "0 TEXT 8 a 1 here", LINE))
+    path.write_text(path.read_text().replace("here", "one\x0btwo\x85three\u2028four"), encoding="utf-8")
+    assert extent(read_dxf(path)) == pytest.approx([0, 0, 1, 1])
+
+
+@pytest.mark.parametrize("groups", ["10 here 20 0", "10 nan 20 0"])
+def test_a_place_that_is_no_number_is_told(drawn: Read, groups: str) -> None:
+    for entity in (f"0 LWPOLYLINE 8 a 90 1 {groups}", f"0 SPLINE 8 a {groups}", f"0 POINT 8 a {groups}"):
+        with pytest.raises(InputError, match=r"group 10 of a DXF entity is '(here|nan)', not a number"):
+            drawn(entity)
+
+
+def test_a_unit_that_parts_do_not_have_can_be_given(tmp_path: Path) -> None:
+    path = written(tmp_path / "part.dxf", section("ENTITIES", LINE))
+    path.write_text(path.read_text().replace("70\n4\n", "70\n9\n"))
+    assert extent(read_dxf(path)) == pytest.approx([0, 0, 0.0254, 0.0254])
+    path.write_text(path.read_text().replace("70\n9\n", "70\n20\n"))
+    with pytest.raises(InputError, match="= 20 is no unit of drawings of parts; give its unit"):
+        read_dxf(path)
+    assert extent(read_dxf(path, "cm")) == pytest.approx([0, 0, 10, 10])

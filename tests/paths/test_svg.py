@@ -1,0 +1,141 @@
+"""SVG drawings as drawing programs write them: sizes, clones, style sheets, and what is passed over and told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.core.errors import InputError
+from rds.nc.shapes.curves import Drawing
+from rds.nc.shapes.svg import read_svg
+
+Read = Callable[..., Drawing]
+SIZE = 'width="100mm" height="100mm" viewBox="0 0 100 100"'
+BOX = '<rect x="10" y="20" width="30" height="40"/>'
+
+
+@pytest.fixture
+def drawn(tmp_path: Path) -> Read:
+    def read(inner: str, size: str = SIZE) -> Drawing:
+        path = tmp_path / "part.svg"
+        head = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+        path.write_text(f"<svg {head} {size}>{inner}</svg>")
+        return read_svg(path)
+
+    return read
+
+
+def extent(drawing: Drawing) -> list[float]:
+    """Least x and y, greatest x and y, mm, with Y upwards."""
+    points = np.vstack([curve.points for curve in drawing.curves])
+    return [*points.min(axis=0), *points.max(axis=0)]
+
+
+@pytest.mark.parametrize(
+    ("aspect", "expected"),
+    [
+        ("", [60, 40, 90, 80]),  # in the middle of the wide page, and not stretched
+        ("xMinYMid meet", [10, 40, 40, 80]),
+        ("xMaxYMax", [110, 40, 140, 80]),
+        ("none", [20, 40, 80, 80]),
+        ("xMidYMin slice", [20, -20, 80, 60]),
+        ("xMidYMax slice", [20, 80, 80, 160]),
+    ],
+)
+def test_a_page_of_another_shape_than_its_view_box_does_not_stretch(
+    drawn: Read, aspect: str, expected: list[float]
+) -> None:
+    size = 'width="200mm" height="100mm" viewBox="0 0 100 100"'
+    size += f' preserveAspectRatio="{aspect}"' if aspect else ""
+    assert extent(drawn(BOX, size)) == pytest.approx(expected)
+
+
+def test_a_drawing_within_the_drawing_lies_where_it_is_put(drawn: Read) -> None:
+    assert extent(drawn(f'<svg x="50" y="10">{BOX}</svg>')) == pytest.approx([60, 30, 90, 70])
+    inner = f'<svg x="50" y="10" width="50%" height="50" viewBox="0 0 100 100">{BOX}</svg>'
+    assert extent(drawn(inner)) == pytest.approx([55, 60, 70, 80])
+
+
+def test_per_cent_are_of_the_view_box(drawn: Read) -> None:
+    size = 'width="200mm" height="100mm" viewBox="0 0 200 100"'
+    assert extent(drawn('<rect x="10%" y="10%" width="50%" height="50%"/>', size)) == pytest.approx([20, 40, 120, 90])
+    assert drawn('<circle cx="50%" cy="50%" r="10%"/>').curves[0].circle == pytest.approx((50, 50, 10))
+
+
+@pytest.mark.parametrize(
+    ("radii", "narrow"),
+    [
+        ('rx="10" ry="0"', 60),  # either is 0: no rounding
+        ('ry="10"', 40),
+        ('rx="10" ry="-1"', 40),  # a negative one is as if it was not given
+        ('rx="auto" ry="10"', 40),
+    ],
+)
+def test_the_corners_of_a_rectangle_are_as_round_as_they_should_be(drawn: Read, radii: str, narrow: float) -> None:
+    points = drawn(f'<rect x="10" y="10" width="60" height="60" {radii}/>').curves[0].points
+    top = points[abs(points[:, 1] - 90) < 1e-9]
+    assert np.ptp(top[:, 0]) == pytest.approx(narrow)
+
+
+def test_an_ellipse_with_one_radius_is_a_circle(drawn: Read) -> None:
+    assert drawn('<ellipse cx="50" cy="50" rx="20"/>').curves[0].circle == pytest.approx((50, 50, 20))
+
+
+@pytest.mark.parametrize("href", ["href", "xlink:href"])
+def test_clones_are_drawn_where_they_are_put(drawn: Read, href: str) -> None:
+    drawing = drawn(f'<defs><g id="a">{BOX}</g></defs><use {href}="#a" x="40" y="10" transform="scale(0.5)"/>')
+    assert extent(drawing) == pytest.approx([25, 65, 40, 85])
+    symbol = f'<symbol id="s" viewBox="0 0 100 100">{BOX}</symbol><use {href}="#s" x="50" width="50" height="50"/>'
+    assert extent(drawn(symbol)) == pytest.approx([55, 70, 70, 90])
+
+
+def test_clones_that_multiply_without_end_are_refused(drawn: Read) -> None:
+    groups = "".join(f'<g id="g{k}">' + f'<use href="#g{k + 1}"/>' * 20 + "</g>" for k in range(8))
+    with pytest.raises(InputError, match="more than 2000000 points, clones included"):
+        drawn(f'<defs>{groups}<g id="g8">{BOX}</g></defs><use href="#g0"/>')
+
+
+def test_a_clone_of_itself_ends(drawn: Read) -> None:
+    drawing = drawn(
+        f'{BOX}<g id="a"><use href="#b"/><use href="#b"/></g><g id="b"><use href="#a"/><use href="#a"/></g>'
+    )
+    assert extent(drawing) == pytest.approx([10, 40, 40, 80])
+    assert "or of itself" in drawing.notes[0]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        '<g visibility="hidden"><path d="M0 0H99"/></g>',
+        '<path style="visibility: collapse" d="M0 0H99"/>',
+        '<style>.st0{display:none;} .st1{fill:red}</style><g class="st1 st0"><path d="M0 0H99"/></g>',
+        '<style>/* a layer */ #Layer_2, #Layer_3 { display : none }</style><g id="Layer_2"><path d="M0 0H99"/></g>',
+        '<path style="display:none !important" d="M0 0H99"/>',
+    ],
+)
+def test_what_is_hidden_is_passed_over_and_told(drawn: Read, other: str) -> None:
+    drawing = drawn(BOX + other)
+    assert extent(drawing) == pytest.approx([10, 40, 40, 80])
+    assert drawing.notes == ["passed over: 1 × hidden objects"]
+
+
+def test_what_is_visible_in_a_hidden_group_is_drawn(drawn: Read) -> None:
+    inner = f'<g visibility="hidden"><path d="M0 0H99"/><g visibility="visible">{BOX}</g></g>'
+    assert extent(drawn(inner)) == pytest.approx([10, 40, 40, 80])
+
+
+@pytest.mark.parametrize(
+    ("attribute", "told"),
+    [
+        ('clip-path="url(#c)"', "a clip or mask: its object is drawn whole"),
+        ('style="mask:url(#c)"', "a clip or mask: its object is drawn whole"),
+        ('transform="rotate(90)" transform-origin="50 50"', "a transformation by CSS"),
+        ('style="transform: rotate(90deg)"', "a transformation by CSS"),
+    ],
+)
+def test_what_is_not_done_to_an_object_is_told(drawn: Read, attribute: str, told: str) -> None:
+    notes = drawn(f"<g {attribute}>{BOX}</g>").notes
+    assert len(notes) == 1 and told in notes[0]
