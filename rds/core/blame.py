@@ -28,6 +28,8 @@ def student_error(exc: BaseException, path_or_source: str | Path | Source | None
         line = (exc.text or "").strip()
         return _sentence(f"{Path(exc.filename).name}, line {exc.lineno}", type(exc).__name__, exc.msg, line)
     own = _own_frames(exc, path)
+    if not own and isinstance(exc.__cause__, StopIteration):  # in a generator: its own error has no line
+        own = _own_frames(exc.__cause__, path)
     if not own:
         return f"{type(exc).__name__}: {_text(exc)}"
     frame = own[-1]

@@ -3,6 +3,8 @@
 # ruff: noqa: E501 - a notebook's cell is easier to read on the line on which it is written
 from __future__ import annotations
 
+import tracemalloc
+
 import pytest
 
 from rds.grading.intake.items import Refusal
@@ -70,6 +72,24 @@ def test_a_gain_that_is_set_in_an_unusual_way_is_graded(cell: str) -> None:
     run = "import rds\nresult = rds.Experiment(controller=control, params=params).run()\nprint(params, result['rms'])"
     found = made(head, cell, run)
     assert found["control"](0.0, 0.0, 1.0, None, found["params"])[0] == 30.0  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("magic", ["%%writefile law.py", "%%file law.py", "\n%%writefile -a law.py"])
+def test_a_law_that_is_only_written_into_a_file_is_refused_in_words(magic: str) -> None:
+    law = "def control(t, r, y, state, params):\n    return 1.0, state"
+    with pytest.raises(Refusal, match=r"cell 2 only writes law\.py .*take that line away"):
+        converted(notebook("x = 1", f"{magic}\n{law}").encode())
+    assert made(f"{magic}\n{law}", law)["control"]
+
+
+def test_what_a_notebook_says_is_followed_in_little_memory() -> None:
+    """Each import was kept once for each statement: 20 000 of them took the grader 6 GB."""
+    tracemalloc.start()
+    try:
+        converted(notebook("\n".join(f"import zz{n} as a{n}" for n in range(1000))).encode())
+        assert tracemalloc.get_traced_memory()[1] < 30 << 20
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.parametrize(
