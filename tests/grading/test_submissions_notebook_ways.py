@@ -3,12 +3,16 @@
 # ruff: noqa: E501 - a notebook's cell is easier to read on the line on which it is written
 from __future__ import annotations
 
+import sys
 import tracemalloc
 
 import pytest
 
+from rds.core.parallel import spread
+from rds.grading.batch.queue import _converted
+from rds.grading.batch.spool import Spool, Spooled
 from rds.grading.intake.items import Refusal
-from rds.grading.intake.notebooks import converted
+from rds.grading.intake.notebooks import INTERFACE, Converted, converted
 from tests.grading.batches import notebook
 from tests.grading.test_submissions_notebooks import made
 
@@ -139,3 +143,18 @@ def test_experiments_that_change_nothing_are_left_out(cell: str) -> None:
     found = made(head, cell)
     assert found["control"](0.0, 0.0, 1.0, None, found["params"])[0] == 30.0  # type: ignore[operator]
     assert not found.keys() & {"experiment", "df", "ys", "run"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux alone")
+def test_a_file_is_read_with_bounded_memory_apart_from_the_batch() -> None:
+    """What its author's statements make of the grader's memory ends that process's work, and not the computer's."""
+    import resource
+
+    def look(work: tuple[Spooled | None, tuple[str, ...]]) -> tuple[bool, int]:
+        return isinstance(_converted(work), Converted), resource.getrlimit(resource.RLIMIT_AS)[0]
+
+    law = notebook("def control(t, r, y, state, params):\n    return 1.0, state")
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    (outcome,) = spread(look, [(Spool().put(law.encode()), INTERFACE)], jobs=1)
+    assert outcome.value[0] and outcome.value[1] != resource.RLIM_INFINITY
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
