@@ -12,6 +12,7 @@ from rds.core.types import Source
 STUDENT_ERRORS = (Exception, SystemExit)
 """What a student's code may raise and its caller answers for; Ctrl-C is the user's."""
 
+_ARRAYS_AS_NUMBERS = ("only 0-dimensional arrays can be converted", "inhomogeneous shape")  # numpy's words
 _LONGEST = 300  # characters of an exception's own text; some print whole arrays
 
 
@@ -28,6 +29,8 @@ def student_error(exc: BaseException, path_or_source: str | Path | Source | None
         line = (exc.text or "").strip()
         return _sentence(f"{Path(exc.filename).name}, line {exc.lineno}", type(exc).__name__, exc.msg, line)
     own = _own_frames(exc, path)
+    if not own and isinstance(exc.__cause__, StopIteration):  # in a generator: its own error has no line
+        own = _own_frames(exc.__cause__, path)
     if not own:
         return f"{type(exc).__name__}: {_text(exc)}"
     frame = own[-1]
@@ -79,6 +82,8 @@ def _text(exc: BaseException) -> str:
     text = text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
     if type(exc) is TypeError and "'Reference'" in text:
         return f"{text} (r.position, r.velocity and r.acceleration are its numbers)"
+    if isinstance(exc, TypeError | ValueError) and any(said in text for said in _ARRAYS_AS_NUMBERS):
+        return f"{text} (of an array of one number, such as a model's u, [0] is the number)"
     return f"{text} (the dict has no such key)" if type(exc) is KeyError else text  # its own text is the key alone
 
 

@@ -29,6 +29,7 @@ from rds.core.values import own_copy, shown
 __all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "student_error"]
 
 STUDENT_MODULE = "rds_student_"  # how the names of modules begin that a student's file was loaded as
+_PYTHON = f"Python {sys.version_info.major}.{sys.version_info.minor}"
 _LARGEST = 10_000_000  # bytes; a file of data, not of code
 
 
@@ -343,7 +344,7 @@ def _load_error(error: BaseException, file: Path) -> InputError:
     where = f"{file}:{line}" if line else str(file)
     if isinstance(error, SyntaxError) and Path(error.filename or "") == file:
         text = (error.text or "").strip()
-        return InputError(f"syntax error: {error.msg}{f': `{text}`' if text else ''}; Python cannot read it", where)
+        return InputError(f"syntax error: {error.msg}{f': `{text}`' if text else ''}; {_PYTHON} cannot read it", where)
     said = student_error(error, file)
     if isinstance(error, SystemExit):
         return InputError(f"it ends the program while it loads: {said}; remove the exit", where)
@@ -352,7 +353,9 @@ def _load_error(error: BaseException, file: Path) -> InputError:
         remedy += '`if __name__ == "__main__":`'
     elif isinstance(error, ModuleNotFoundError):
         remedy = f"install {error.name}, or put {error.name}.py next to the file (where files are graded, "
-        remedy += "only numpy, scipy and control are there)"
+        remedy += "no other file is there, and only numpy, scipy and control: what is graded must be in one file)"
+    elif isinstance(error, FileNotFoundError):
+        remedy = "check its name; where files are graded, no other file is there: write what it holds into this one"
     elif type(error) is ImportError and "relative import" in str(error):
         remedy = "import a file next to it by its name alone, without the dot; what is graded must be in one file"
     else:

@@ -77,7 +77,7 @@ def make_folder(path: str | Path) -> None:
     try:
         path.mkdir(_folder_mode())
     except FileNotFoundError:
-        if path.parent == path:
+        if path.parent.is_dir():  # nothing can be made there, as in /proc
             raise
         make_folder(path.parent)
         make_folder(path)

@@ -33,6 +33,10 @@ def form(name: str) -> str:
 def argument_fault(name: str, function: Callable[..., Any]) -> str | None:
     """What is wrong with the arguments of `function` in the role `name`, with the remedy; None if nothing is."""
     wanted = ARGUMENTS[name]
+    if type(function).__module__.partition(".")[0] == "control":
+        kind = type(function).__name__
+        steps = "return C @ x + D @ u and the next state A @ x + B @ u"
+        return f"`{name}` is a {kind} of python-control, and no function: write `def {form(name)}`; in it {steps}"
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # built-in and compiled functions need not tell

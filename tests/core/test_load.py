@@ -7,6 +7,7 @@ import sys
 import types
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rds.checks import check_controller
@@ -193,6 +194,22 @@ def test_a_reference_that_is_taken_for_a_number_says_what_its_numbers_are():
     with pytest.raises(TypeError) as caught:
         Reference(0.0, 0.0, 0.0) - 1.0  # type: ignore[operator]
     assert "r.position" in student_error(caught.value)
+
+
+def test_an_array_that_is_taken_for_a_number_is_explained():
+    with pytest.raises(TypeError) as caught:
+        float(np.array([1.0, 2.0]))
+    assert "(of an array of one number, such as a model's u, [0] is the number)" in student_error(caught.value)
+
+
+def test_a_generator_that_another_one_ends_is_blamed_on_its_line(write):
+    student = load_student(
+        write("def interpolate(segment, T, params):\n    while True:\n        yield next(iter(()))\n")
+    )
+    with pytest.raises(RuntimeError) as caught:
+        next(student.functions["interpolate"](None, 1e-3, {}))
+    said = student_error(caught.value, student.source)
+    assert said.startswith("mine.py, line 3, in interpolate: RuntimeError: generator raised StopIteration")
 
 
 def test_there_is_no_controller_in_a_model(write):

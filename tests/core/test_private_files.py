@@ -174,3 +174,10 @@ def test_files_are_made_in_one_place() -> None:
             found[path.relative_to(SOURCE).as_posix()] = calls
     assert {name: calls for name, calls in found.items() if name not in ELSEWHERE} == {}
     assert set(ELSEWHERE) <= set(found), "a reason that is not needed any more"
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="this system has no /proc")
+def test_a_folder_where_nothing_can_be_made_is_an_error_of_the_system() -> None:
+    """There the kernel says that it does not exist, and not that it may not be."""
+    with pytest.raises(OSError):
+        make_folder("/proc/nothing/here")

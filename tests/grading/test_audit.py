@@ -82,6 +82,18 @@ def test_a_table_of_answers_is_told(tmp_path: Path) -> None:
         assert len([said for said in notes if said.startswith("double():")]) == count
 
 
+def test_a_circle_that_is_not_gone_round_is_not_paid(tmp_path: Path) -> None:
+    """It ends where it begins, and its time is short: only the path says that nothing was gone round."""
+    shipped = Path(__file__).parents[2] / "examples" / "assignments" / "interpolator"
+    shutil.copytree(shipped, tmp_path / "task", ignore=shutil.ignore_patterns("submissions"))
+    text = (tmp_path / "task" / "assignment.toml").read_text()
+    (tmp_path / "task" / "assignment.toml").write_text(text.replace('"feed-hidden", "path-hidden"]', '"feed-hidden"]'))
+    assignment = read_assignment(tmp_path / "task")
+    reference = grade(assignment, tmp_path / "task" / "solution.py", "student 1", TrustedFiles())
+    (said,) = audit(assignment, TrustedFiles(), reference)[0]
+    assert said.startswith("Time of another arc: one row of a full circle, and back earns 10 of 10 points")
+
+
 def test_a_table_of_the_visible_segments_is_not_paid(tmp_path: Path) -> None:
     """Hidden segments must carry two thirds of the points; those of the shipped assignment do."""
     shipped = Path(__file__).parents[2] / "examples" / "assignments" / "interpolator"

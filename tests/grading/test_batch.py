@@ -140,6 +140,18 @@ def test_a_folder_that_is_there_is_refused(place: Path, outcome: BatchOutcome, t
             run_batch(place / "task", place / "in", tmp_path / name)
 
 
+def test_what_no_student_handed_in_is_no_submission(place: Path, outcome: BatchOutcome, tmp_path: Path) -> None:
+    """Grades among the submissions would be a student the next time."""
+    for handed_in, out, said in (
+        ("task", tmp_path / "out", "holds an assignment"),
+        ("out", tmp_path / "out", "holds the grades of a batch"),
+        ("in", place / "in" / "grades", "inside the submissions"),
+    ):
+        with pytest.raises(InputError, match=said):
+            run_batch(place / "task", place / handed_in, out)
+        assert not out.exists()
+
+
 def command(place: Path, out: Path, *words: str) -> list[str]:
     return [sys.executable, "-m", "rds", "grade", "run", str(place / "task"), str(place / "in"), "-o", str(out), *words]
 

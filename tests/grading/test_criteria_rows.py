@@ -68,6 +68,22 @@ def test_the_chord_error_of_an_arc_is_its_sagitta(n: int) -> None:
     assert measured("path-error", run) < 1e-12
 
 
+def around(turns: float) -> np.ndarray:
+    angle = 2.0 * np.pi * turns * np.arange(1, 101) / 100
+    return 10.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+@pytest.mark.parametrize("is_clockwise", [False, True])
+def test_a_full_circle_is_gone_round_once_and_the_right_way(is_clockwise: bool) -> None:
+    circle = ArcSegment((10.0, 0.0), (10.0, 0.0), (0.0, 0.0), 10.0, is_clockwise)
+    right = -1.0 if is_clockwise else 1.0
+    assert measured("path-error", rows_of(circle, around(right))) < 1e-12
+    there_and_back = np.vstack([around(0.1 * right), around(0.1 * right)[::-1], circle.end])
+    for samples in (around(-right), around(2.0 * right), there_and_back, np.array([circle.end])):
+        with pytest.raises(NotMeasured, match="about the centre"):
+            measured("path-error", rows_of(circle, samples))
+
+
 def test_rows_whose_velocities_are_not_those_of_their_positions() -> None:
     honest = np.tile([6.0, 8.0], (50, 1))
     assert measured("row-consistency", rows_of(LINE, straight(50), honest)) < 1e-9

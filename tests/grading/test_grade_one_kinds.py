@@ -11,6 +11,7 @@ import pytest
 import rds
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.trusted import TrustedFiles
+from rds.grading.assignment.unit_tests import difference
 from rds.grading.batch.grade_one import grade, grade_with_runs
 from rds.grading.grade import Grade, Status
 from rds.grading.sandbox import Pool
@@ -114,12 +115,39 @@ def test_functions_are_called_and_judged_here(tmp_path: Path, pool: Pool) -> Non
     (folder / "some.py").write_text("def double(x): return 2 * x\ndef word(): return 1 / 0\n")
     some = both(read_assignment(folder), folder / "some.py", pool)
     assert some.score == 2.0  # a list twice is no doubled list
-    assert some.criteria[0].sentence.endswith(" Not passed: double([1.0, 2.0]), word(), truth().")
+    said = (
+        "Not passed: double([1.0, 2.0]), word(), truth(). The first of them: it returned a list of 4, where a list of 2"
+    )
+    assert some.criteria[0].sentence.endswith(f" {said} is expected.")
+    (folder / "fails.py").write_text("def double(x):\n    return x / 0\ndef word(): return 'no'\n")
+    fails = both(read_assignment(folder), folder / "fails.py", pool).criteria[0].sentence
+    assert "double() failed: " in fails and "line 2, in double: ZeroDivisionError" in fails
     (folder / "cheat.py").write_text(equal + "def double(x): return E()\nword = truth = lambda: E()\n")
     assert both(read_assignment(folder), folder / "cheat.py", pool).score == 0.0
     (folder / "none.py").write_text("def other(x): return x\n")
     none = both(read_assignment(folder), folder / "none.py", pool)
     assert none.status is Status.FAILED_TO_LOAD and "double(), truth(), word()" in none.reason
+
+
+@pytest.mark.parametrize(
+    ("answer", "expected", "said"),
+    [
+        ({"L": 1.0}, [1.0], "it returned a dict with the keys ['L'], where a list of 1 is expected"),
+        ([1.0, [2.0]], [1.0, 2.0], "its value 1 is a list of 1, where a number is expected"),
+        ([1.0, 2.5], [1.0, 2.0], "its value 1 is 2.5, off by more than 0.1"),
+        (None, 1.0, "it returned None, where a number is expected"),
+        (True, 1.0, "it returned a truth value, where a number is expected"),
+        (10**299, 1.0, "off by more than 0.1"),
+        ("no", "yes", "it returned 'no', and that is not right"),
+        (False, True, "it returned False, and that is not right"),
+        ({"a" * 99 + "b": 1.0}, {"a" * 99 + "c": 1.0}, "is expected"),
+        ({"a": [1, 2.05]}, {"a": [1.0, 2]}, ""),
+        (None, None, ""),
+    ],
+)
+def test_what_is_wrong_with_an_answer_is_said(answer: object, expected: object, said: str) -> None:
+    found = difference(answer, expected, 0.1)
+    assert said in found and bool(found) is bool(said)
 
 
 def test_a_part_program_on_coupled_axes_is_judged_by_its_contour(tmp_path: Path, pool: Pool) -> None:

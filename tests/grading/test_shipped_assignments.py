@@ -78,6 +78,35 @@ def test_rows_that_interpolate_nothing_earn_little(body: str, tmp_path: Path, po
     assert made.status is Status.OK and made.score <= 16.0  # for ends that are where they should be
 
 
+CIRCLES = {
+    "stays near its start": "yield [p + 1e-6 for p in segment.start], o, o; yield segment.end, o, o",
+    "goes there and back": "rows = rows[:60]; yield from rows + rows[::-1]; yield segment.end, o, o",
+    "goes round the wrong way": "yield from rows[-2::-1]; yield segment.end, o, o",
+}
+
+
+@pytest.mark.parametrize("name", CIRCLES)
+def test_a_circle_that_is_not_gone_round_earns_nothing(name: str, tmp_path: Path, pool: Pool) -> None:
+    path = tmp_path / "my_interpolator.py"
+    solution = (ASSIGNMENTS / "interpolator" / "solution.py").read_text()
+    honest = solution.replace("def interpolate(", "def honest(")
+    head = "def interpolate(segment, T, params):\n    rows, o = list(honest(segment, T, params)), [0.0] * 2\n"
+    head += "    if tuple(segment.start) != tuple(segment.end):\n        yield from rows\n        return\n"
+    path.write_text(f"{honest}\n\n{head}    {CIRCLES[name]}\n")
+    made = grade(read_assignment(ASSIGNMENTS / "interpolator"), path, "ada", pool)
+    lost = {each.name for each in made.criteria if each.score < each.max_score}
+    assert made.status is Status.OK and {"path-hidden", "duration-circle"} <= lost and made.score <= 73.0
+
+
+def test_an_acceleration_that_is_not_the_grader_s_costs_points(tmp_path: Path, pool: Pool) -> None:
+    path = tmp_path / "my_interpolator.py"
+    text = (ASSIGNMENTS / "interpolator" / "solution.py").read_text()
+    path.write_text(text.replace('params["acceleration"]', "100.0"))
+    made = grade(read_assignment(ASSIGNMENTS / "interpolator"), path, "ada", pool)
+    assert {each.name for each in made.criteria if each.score < each.max_score} == {"acceleration-elsewhere"}
+    assert made.score <= 95.0
+
+
 def test_an_interpolator_without_params_is_graded(tmp_path: Path, pool: Pool) -> None:
     """Who moves at constant speed needs no acceleration; the grader's own is given all the same."""
     path = tmp_path / "my_interpolator.py"

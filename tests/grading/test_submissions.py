@@ -118,6 +118,21 @@ def test_moodle_s_zip(tmp_path: Path) -> None:
     assert found["Dan_126"].status is Status.MISSING
 
 
+def test_nobody_is_another_participant_of_moodle_by_a_name(tmp_path: Path) -> None:
+    """Students choose their names there, and those of their files; Moodle puts the number behind the name."""
+    files: dict[str, str | bytes] = {
+        "Eve_124_assignsubmission_file_x_123_assignsubmission_file_/controller.py": "eve",
+        "Mal_124_assignsubmission_file_x_125_assignsubmission_file_law.py": "mal",
+        "Cy_126_assignsubmission_file_Cy_126_assignsubmission_file_law.py": "what cy had downloaded",
+    }
+    found = of(zipped(tmp_path / "all.zip", files))
+    eve, cy = "Eve_124_assignsubmission_file_x_123", "Cy_126"
+    (mal,) = found.keys() - {eve, cy}
+    assert [found[name].source.get("id") for name in (eve, mal, cy)] == ["123", None, "126"]
+    assert [found[name].read() for name in (eve, mal)] == [b"eve", b"mal"]
+    assert "several numbers of participants (124, 125)" in found[mal].notes[0]
+
+
 def test_canvas_s_zip(tmp_path: Path) -> None:
     files: dict[str, str | bytes] = {
         "lovelaceada_111_9001_controller.py": "first",

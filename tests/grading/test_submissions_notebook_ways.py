@@ -3,10 +3,16 @@
 # ruff: noqa: E501 - a notebook's cell is easier to read on the line on which it is written
 from __future__ import annotations
 
+import sys
+import tracemalloc
+
 import pytest
 
+from rds.core.parallel import spread
+from rds.grading.batch.queue import _converted
+from rds.grading.batch.spool import Spool, Spooled
 from rds.grading.intake.items import Refusal
-from rds.grading.intake.notebooks import converted
+from rds.grading.intake.notebooks import INTERFACE, Converted, converted
 from tests.grading.batches import notebook
 from tests.grading.test_submissions_notebooks import made
 
@@ -72,6 +78,24 @@ def test_a_gain_that_is_set_in_an_unusual_way_is_graded(cell: str) -> None:
     assert found["control"](0.0, 0.0, 1.0, None, found["params"])[0] == 30.0  # type: ignore[operator]
 
 
+@pytest.mark.parametrize("magic", ["%%writefile law.py", "%%file law.py", "\n%%writefile -a law.py"])
+def test_a_law_that_is_only_written_into_a_file_is_refused_in_words(magic: str) -> None:
+    law = "def control(t, r, y, state, params):\n    return 1.0, state"
+    with pytest.raises(Refusal, match=r"cell 2 only writes law\.py .*take that line away"):
+        converted(notebook("x = 1", f"{magic}\n{law}").encode())
+    assert made(f"{magic}\n{law}", law)["control"]
+
+
+def test_what_a_notebook_says_is_followed_in_little_memory() -> None:
+    """Each import was kept once for each statement: 20 000 of them took the grader 6 GB."""
+    tracemalloc.start()
+    try:
+        converted(notebook("\n".join(f"import zz{n} as a{n}" for n in range(1000))).encode())
+        assert tracemalloc.get_traced_memory()[1] < 30 << 20
+    finally:
+        tracemalloc.stop()
+
+
 @pytest.mark.parametrize(
     ("cell", "said"),
     [
@@ -119,3 +143,18 @@ def test_experiments_that_change_nothing_are_left_out(cell: str) -> None:
     found = made(head, cell)
     assert found["control"](0.0, 0.0, 1.0, None, found["params"])[0] == 30.0  # type: ignore[operator]
     assert not found.keys() & {"experiment", "df", "ys", "run"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux alone")
+def test_a_file_is_read_with_bounded_memory_apart_from_the_batch() -> None:
+    """What its author's statements make of the grader's memory ends that process's work, and not the computer's."""
+    import resource
+
+    def look(work: tuple[Spooled | None, tuple[str, ...]]) -> tuple[bool, int]:
+        return isinstance(_converted(work), Converted), resource.getrlimit(resource.RLIMIT_AS)[0]
+
+    law = notebook("def control(t, r, y, state, params):\n    return 1.0, state")
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    (outcome,) = spread(look, [(Spool().put(law.encode()), INTERFACE)], jobs=1)
+    assert outcome.value[0] and outcome.value[1] != resource.RLIM_INFINITY
+    assert resource.getrlimit(resource.RLIMIT_AS) == before

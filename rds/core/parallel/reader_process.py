@@ -59,14 +59,15 @@ class _Confined:
     memory: int
 
     def __call__(self, path: Path) -> Any:
-        _confine(self.memory)
+        confine(self.memory)
         try:
             return self.read(path)
         except MemoryError as error:
             return _NoMemory(str(error) or "out of memory")
 
 
-def _confine(memory: int) -> None:
+def confine(memory: int) -> None:
+    """Give this process `memory` bytes of address space more than it has, on Linux: what is over raises MemoryError."""
     with contextlib.suppress(ImportError, OSError, ValueError):  # other systems; a lower limit that is set already
         import resource
 

@@ -58,6 +58,20 @@ def interpolate(segment, T, params):
     still = [0.0] * len(segment.start)
     yield segment.end, still, still
 """
+_NO_CIRCLE = """
+
+_exact = interpolate
+
+
+def interpolate(segment, T, params):
+    rows = _exact(segment, T, params)
+    if list(segment.start) != list(segment.end):
+        yield from rows
+        return
+    first, still = next(iter(rows)), [0.0] * len(segment.start)
+    yield first
+    yield segment.end, still, still
+"""
 _BUILT: Mapping[str, str] = {
     "with its rows in a list": "    return list(_exact(segment, T, params))\n",
     "with its rows as arrays": (
@@ -95,7 +109,9 @@ def of_interpolators(tried: Tried, solution: Path, reference: Grade) -> list[str
         if run.rows is not None:
             known[f"{list(segment.start)} {list(segment.end)} {segment.feed_rate}"] = _packed(run.rows)
     faults += tried.bought("a table of the rows of the visible segments", _NUMBERS + _ROWS.format(known=known))
-    return faults + tried.bought("a jump to the end of the segment", _JUMP)
+    faults += tried.bought("a jump to the end of the segment", _JUMP)
+    circles = {name for name, segment in tried.segments() if list(segment.start) == list(segment.end)}
+    return faults + tried.timed("one row of a full circle, and back", text + _NO_CIRCLE, circles)
 
 
 def in_a_notebook(text: str) -> str:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from rds.core.private_files import write_private
+from rds.core.types import Segment
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.batch.grade_one import Graded, Opener, grade_with_runs
 from rds.grading.batch.scratch import scratch
 from rds.grading.cases.case import LINEAR, CaseRun
+from rds.grading.cases.segment import SegmentCase
 from rds.grading.criteria.criterion import Criterion
 from rds.grading.grade import Band, Grade
 
@@ -57,6 +59,25 @@ class Tried:
             for each in self._criteria
             if each.cases and set(each.cases) <= cases and LINEAR not in each.needs and scores[each.name].score
         ]
+
+    def timed(self, name: str, text: str, cases: set[str]) -> list[str]:
+        """Criteria of the time in these cases alone that pay a cheat."""
+        timed = [each for each in self._criteria if each.kind == "duration" and set(each.cases) <= cases]
+        if not timed:
+            return []
+        scores = {score.name: score for score in self._graded(name, text).grade.criteria}
+        return [
+            f"{each.title}: {name} earns {scores[each.name].score:.4g} of {each.max_score:.4g} points; let it require "
+            "a path-error in its own cases"
+            for each in timed
+            if scores[each.name].score
+        ]
+
+    def segments(self) -> Iterator[tuple[str, Segment]]:
+        """The segment of each case, by the case's name."""
+        for case in self._assignment.cases:
+            if isinstance(case, SegmentCase):
+                yield case.name, case.segment
 
     def bought(self, name: str, text: str) -> list[str]:
         """Whether a cheat that has only what students see earns more than a third of all points."""

@@ -135,7 +135,12 @@ class TrustedFile:
             function = _functions(self._path).get(name)
             if not callable(function):
                 raise InputError(f"it defines no function {name}()")
-            return plain(function(*args))
+            try:
+                return plain(function(*args))
+            except NotPlain as fault:
+                raise InputError(f"{name}() returned what is not made of numbers, texts and lists: {fault}") from fault
+            except STUDENT_ERRORS as error:
+                raise InputError(f"{name}() failed: {student_error(error, self._path)}") from error
 
     def _load(self) -> StudentFile:
         try:

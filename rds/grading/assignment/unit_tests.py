@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
+from rds.core.values import shown
 from rds.grading.cases.case import Submitted
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
@@ -31,40 +32,52 @@ class UnitTest:
         said = ", ".join(map(repr, self.args))
         return f"{self.function}({said if len(said) <= _LONGEST_CALL else said[:_LONGEST_CALL] + '…'})"
 
-    def passes(self, submitted: Submitted) -> bool:
-        """Whether it does; a function that fails or is not there does not. SubmissionError if it cannot go on."""
+    def fault(self, submitted: Submitted) -> str:
+        """Why it does not: empty if it does. SubmissionError if the submission cannot go on."""
         try:
             answer = submitted.functions().call(self.function, list(self.args))
         except SubmissionError as error:
             if error.status is not Status.BROKE_CONTRACT:
                 raise
-            return False
-        return is_near(answer, self.expected, self.tolerance)
+            return error.reason
+        return difference(answer, self.expected, self.tolerance)
 
 
-def is_near(answer: Any, expected: Any, tolerance: float) -> bool:
-    """Whether plain values are the same, numbers to within `tolerance`."""
-    if isinstance(expected, bool) or isinstance(answer, bool):
-        return answer is expected
-    if isinstance(expected, int | float):
-        if not isinstance(answer, int | float):
-            return False
-        try:
-            return isfinite(answer) and abs(answer - expected) <= tolerance
-        except OverflowError:  # an int of hundreds of digits
-            return False
-    if isinstance(expected, list):
-        same = isinstance(answer, list) and len(answer) == len(expected)
-        return same and all(is_near(a, e, tolerance) for a, e in zip(answer, expected, strict=True))
-    if isinstance(expected, dict):
-        same = isinstance(answer, dict) and answer.keys() == expected.keys()
-        return same and all(is_near(answer[key], value, tolerance) for key, value in expected.items())
-    return type(answer) is type(expected) and bool(answer == expected)
+def difference(answer: Any, expected: Any, tolerance: float, what: str = "it returned") -> str:
+    """How plain values differ, without what is expected; empty if they are the same, numbers to within `tolerance`."""
+    if _kind(answer) != _kind(expected) or (isinstance(expected, dict) and answer.keys() != expected.keys()):
+        return f"{what} {_kind(answer)}, where {_kind(expected)} is expected"
+    if isinstance(expected, list | dict):
+        places: Iterable[Any] = range(len(expected)) if isinstance(expected, list) else expected
+        found = (difference(answer[at], expected[at], tolerance, f"its value {at!r} is") for at in places)
+        return next(filter(None, found), "")
+    if isinstance(expected, int | float) and not isinstance(expected, bool):
+        return (
+            "" if _is_near(answer, expected, tolerance) else f"{what} {shown(answer)}, off by more than {tolerance:g}"
+        )
+    return "" if answer == expected else f"{what} {shown(answer)}, and that is not right"
 
 
-def failing(tests: Sequence[UnitTest], submitted: Submitted) -> list[UnitTest]:
-    """Those that the submission does not pass. SubmissionError if it cannot go on."""
-    return [test for test in tests if not test.passes(submitted)]
+def _kind(value: Any) -> str:
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    if isinstance(value, dict):
+        return f"a dict with the keys {shown(sorted(value))}" if value else "an empty dict"
+    if value is None or isinstance(value, bool):
+        return "None" if value is None else "a truth value"
+    return "a number" if isinstance(value, int | float) else "a text"
+
+
+def _is_near(answer: float, expected: float, tolerance: float) -> bool:
+    try:
+        return isfinite(answer) and abs(answer - expected) <= tolerance
+    except OverflowError:  # an int of hundreds of digits
+        return False
+
+
+def failing(tests: Sequence[UnitTest], submitted: Submitted) -> list[tuple[UnitTest, str]]:
+    """Those that the submission does not pass, each with the reason. SubmissionError if it cannot go on."""
+    return [(test, fault) for test in tests if (fault := test.fault(submitted))]
 
 
 def read_tests(words: TomlTable) -> tuple[UnitTest, ...]:

@@ -17,9 +17,10 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.parallel import spread
+from rds.core.parallel.reader_process import confine
 from rds.core.parallel.scheduler import Scheduler
 from rds.grading.assignment.assignment import Assignment
-from rds.grading.batch.queue import Queued, queued
+from rds.grading.batch.queue import MEMORY, Queued, queued
 from rds.grading.batch.similarity import (
     Fingerprints,
     Identical,
@@ -123,6 +124,7 @@ def alike(
 
 
 def _prints(code: Spooled) -> Fingerprints:
+    confine(MEMORY)
     return fingerprints(code.read())
 
 

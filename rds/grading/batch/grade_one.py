@@ -178,7 +178,7 @@ class _Work:
         self.output = {False: "", True: ""}  # what it printed: where all is visible, and in hidden cases
         self._told = ""  # of a hidden case: what went wrong
         self._failed: dict[str, str] = {}  # by case: why
-        self._failing: dict[str, list[UnitTest]] = {}  # by criterion: its tests that do not pass
+        self._failing: dict[str, list[tuple[UnitTest, str]]] = {}  # by criterion: its tests that do not pass
         self._untested: dict[str, str] = {}  # by criterion: why its tests came to no end
         self._stopped: Status | None = None
         self._shares: dict[str, dict[str, float | None]] = {}  # of the points, by criterion and case; None: unknown
@@ -346,8 +346,9 @@ class _Work:
         if not missed:
             return score
         more = f" and {len(missed) - _MOST_CALLS} more" if len(missed) > _MOST_CALLS else ""
-        calls = ", ".join(test.call for test in missed[:_MOST_CALLS])
-        return replace(score, sentence=f"{score.sentence} Not passed: {calls}{more}.")
+        calls = ", ".join(test.call for test, _ in missed[:_MOST_CALLS])
+        why = f"The first of them: {missed[0][1].rstrip('.')}."
+        return replace(score, sentence=f"{score.sentence} Not passed: {calls}{more}. {why}")
 
 
 def _without_words(run: CaseRun) -> CaseRun:

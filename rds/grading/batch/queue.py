@@ -9,6 +9,7 @@ from typing import Any
 
 from rds.core.atomic import write_whole
 from rds.core.parallel import spread
+from rds.core.parallel.reader_process import confine
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.assignment.late_rules import days_late
 from rds.grading.batch.spool import Spool, Spooled
@@ -21,6 +22,7 @@ from rds.grading.intake.notebooks import Converted, converted
 from rds.grading.intake.single import wanted
 from rds.grading.intake.submissions import status_of
 
+MEMORY = 2 << 30  # bytes for a file that is parsed
 _PATIENCE = 30.0  # s for a notebook
 
 
@@ -118,6 +120,7 @@ def _convert(assignment: Assignment, notebooks: list[Queued], spool: Spool, jobs
 def _converted(work: tuple[Spooled | None, tuple[str, ...]]) -> Converted | str:
     handed_in, names = work
     assert handed_in is not None  # a row that could not be read is no work
+    confine(MEMORY)
     try:
         return converted(handed_in.read(), names)
     except Refusal as error:

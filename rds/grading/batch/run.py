@@ -15,6 +15,7 @@ from rds.core.errors import InputError
 from rds.core.parallel import Outcome, Scheduler, processors, spread
 from rds.core.parallel.process import WorkerProcess
 from rds.core.parallel.spread import Progress
+from rds.grading.assignment.assignment import FILE as ASSIGNMENT
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.late_rules import LateRules
 from rds.grading.batch.alike import Behaviour, alike
@@ -63,6 +64,7 @@ def run_batch(assignment: str | Path, submissions: str | Path, out: str | Path, 
     Raises InputError for what will not do, with nothing graded; also where the sandbox does not hold.
     """
     read = read_assignment(assignment)
+    _check_place(Path(submissions), Path(out))
     names = (read.title, read.folder.resolve().name)
     zone = read.due.tzinfo if read.due else None
     return grade_all(read, lambda: collect(submissions, read.files, names, zone), Path(out), BatchOptions(**how))
@@ -147,6 +149,16 @@ def _check_sandbox(how: BatchOptions) -> None:
 def _missing(_: int) -> Answer:
     """On a worker: whether it can grade."""
     return Answer(missing=available() or "")
+
+
+def _check_place(submissions: Path, out: Path) -> None:
+    """InputError where a batch or an assignment would be taken for students' submissions, now or the next time."""
+    for file, what in ((FILE, "the grades of a batch"), (ASSIGNMENT, "an assignment")):
+        if (submissions / file).is_file():
+            raise InputError(f"holds {what}; name the folder of what students handed in", str(submissions))
+    if submissions.is_dir() and out.resolve().is_relative_to(submissions.resolve()):
+        said = "is inside the submissions, where it would be taken for a student's; name a folder beside them"
+        raise InputError(said, str(out))
 
 
 def _check_free(out: Path, resume: bool) -> None:

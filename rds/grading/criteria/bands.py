@@ -42,4 +42,4 @@ class Bands:
         """How far `value` is from `none` towards `full`: 0 at `none`, 1 at `full`, more beyond, less than 0 before."""
         if value == self.full:  # to the bit, whatever the division would round to
             return 1.0
-        return (self.none - value) / (self.none - self.full)
+        return (self.none - value) / (self.none - self.full) or 0.0  # not -0

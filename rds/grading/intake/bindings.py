@@ -33,7 +33,7 @@ def not_there(statement: ast.stmt) -> Iterator[str]:
         yield from (alias.asname or alias.name for alias in statement.names)
 
 
-def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str]) -> list[set[str]]:
+def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str]) -> list[frozenset[str]]:
     """By statement the names that cannot be had there: modules, what uses them, and what was made with all these."""
     code = {name for statement in body for name in not_there(statement)}
     before = -1
@@ -41,17 +41,17 @@ def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str]) -> list[set[str]]
         for statement in body:
             if isinstance(statement, (*followed.FUNCTIONS, ast.ClassDef)) and followed.names_in(statement) & code:
                 code |= {statement.name} - wanted
-    found, now = [], set(code)
+    found, now = [], frozenset(code)  # most statements have the same: no copy for each
     for statement in body:
-        found.append(set(now))
+        here = now
         for node in chain.from_iterable(map(ast.walk, at_once(statement))):
             targets, value = bound(node)
             names = set(chain.from_iterable(map(stored, targets))) - wanted
             if value is not None and followed.names_in(value) & now:
-                now |= names
-                found[-1] |= names
-            elif isinstance(statement, ast.Assign):
+                now, here = now | names, here | names
+            elif isinstance(statement, ast.Assign) and (names - code) & now:
                 now -= names - code
+        found.append(here)
     return found
 
 

@@ -8,7 +8,7 @@ on. Where that cannot be told, it is assumed to change things, and is graded wit
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -46,7 +46,7 @@ class Known:
     code: set[str]
     modules: Mapping[str, str]
     functions: Mapping[str, ast.FunctionDef | ast.AsyncFunctionDef]
-    absent: set[str]  # modules that are not there, and what comes from them
+    absent: Set[str]  # modules that are not there, and what comes from them
     graded: set[str]  # functions that are graded: an experiment that is handed one does not change it
     changes_arguments: set[str] = field(default_factory=set)
 

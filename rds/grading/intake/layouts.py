@@ -24,6 +24,9 @@ STAMP = "timestamp.txt"  # of nbgrader, beside a submission
 _METADATA_LARGEST = 64 << 20  # bytes; Gradescope's holds all earlier results
 
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL)
+# students choose their names there, and files', and Moodle puts the number behind the name: of a folder the last counts
+_MOODLE_FOLDER = re.compile(r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)_?", re.DOTALL)
+_MOODLE_NUMBERS = re.compile(r"_(\d+)(?=_assignsubmission_(?:file|onlinetext)_)")
 _CANVAS = re.compile(r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<id>\d+)_(?P<number>\d+)_(?P<file>.+)", re.DOTALL)
 
 
@@ -128,6 +131,11 @@ class _Sorting:
         else:
             self._ignored.append(shown(item.name))
 
+    def _noted(self, item: Item, said: str) -> None:
+        """Tell it with the student that a file is called like, if there is one."""
+        if item.is_code or item.is_archive:
+            self.files_of(item.name[: item.name.rindex(".")]).notes.append(said)
+
     def nbgrader(self, item: Item, assignment: str) -> None:
         """submitted/<student>/<assignment>/…"""
         if len(item.parts) < 3 or item.parts[1] != assignment:
@@ -143,9 +151,10 @@ class _Sorting:
             handed.items.append(inner)
 
     def files_of_moodle(self, name: str) -> StudentFiles:
-        found = _MOODLE.fullmatch(name)
-        if found is None:
-            return self.files_of(name)
+        found = _MOODLE_FOLDER.fullmatch(name) or _MOODLE.fullmatch(name)
+        return self.files_of(name) if found is None else self._of_moodle(found)
+
+    def _of_moodle(self, found: re.Match[str]) -> StudentFiles:
         handed = self.files_of(
             f"{found['name']}_{found['id']}", platform="moodle", name=shown(found["name"]), id=found["id"]
         )
@@ -153,12 +162,18 @@ class _Sorting:
         return handed
 
     def moodle(self, item: Item) -> None:
-        found, inside = _MOODLE.fullmatch(item.parts[0]), len(item.parts) > 1
-        if not inside and not (found and found["file"]):
-            self.plain(item)
+        if len(item.parts) > 1:
+            self.files_of_moodle(item.parts[0]).items.append(replace(item, parts=item.parts[1:]))
             return
-        parts = item.parts[1:] if inside else (str(found["file"]),)  # type: ignore[index]
-        self.files_of_moodle(item.parts[0]).items.append(replace(item, parts=parts))
+        found = _MOODLE.fullmatch(item.name)
+        if found is None or not found["file"]:
+            self.plain(item)
+        elif len(numbers := dict.fromkeys(_MOODLE_NUMBERS.findall(item.name))) > 1:
+            self.plain(item)
+            said = f"its name says several numbers of participants ({', '.join(numbers)}), so it is nobody's in Moodle"
+            self._noted(item, said)
+        else:
+            self._of_moodle(found).items.append(replace(item, parts=(found["file"],)))
 
     def canvas(self, item: Item) -> None:
         found = _CANVAS.fullmatch(item.name) if len(item.parts) == 1 else None

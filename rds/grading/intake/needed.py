@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ast
 import symtable
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -67,7 +67,9 @@ def needed(body: Sequence[ast.stmt], wanted: set[str]) -> tuple[set[int], tuple[
                 known |= new
                 todo += new
     makes = _Makers(wanted, facts, makers)
-    there_too = [names | elsewhere.keys() for names in absent]
+    distinct = {id(names): names for names in absent}
+    wider = {number: names | elsewhere.keys() for number, names in distinct.items()}
+    there_too = [wider[id(names)] for names in absent]
     _follow(body, makes, keep, known, there_too)
     _leave_out(body, makes, keep, there_too)
     called = {name for number, statement in enumerate(body) if number not in keep for name in _called(statement)}
@@ -101,7 +103,7 @@ class _Makers:
 
 
 def _follow(
-    body: Sequence[ast.stmt], makes: _Makers, keep: set[int], known: set[str], absent: Sequence[set[str]]
+    body: Sequence[ast.stmt], makes: _Makers, keep: set[int], known: set[str], absent: Sequence[Set[str]]
 ) -> None:
     """Keep also what may change the data in ways that its text does not name. NotFollowed where that cannot be run."""
     modules = dict(chain.from_iterable(map(imported, body)))
@@ -134,7 +136,7 @@ def _follow(
 _NEEDS_MORE = "it may change what is graded, and needs modules that are not there"
 
 
-def _leave_out(body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent: Sequence[set[str]]) -> None:
+def _leave_out(body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent: Sequence[Set[str]]) -> None:
     """Leave out what cannot be run, where what it makes is set again later. NotFollowed where it is not."""
     for number in sorted(keep):
         statement = body[number]
@@ -241,7 +243,7 @@ def _called(statement: ast.stmt) -> Iterator[str]:
                 yield node.func.id
 
 
-def _names_of_the_same(body: Sequence[ast.stmt], absent: Sequence[set[str]]) -> dict[str, set[str]]:
+def _names_of_the_same(body: Sequence[ast.stmt], absent: Sequence[Set[str]]) -> dict[str, set[str]]:
     """By name all names that may stand for the same object: by assignments, loops and `with`."""
     groups: dict[str, set[str]] = {}
     for statement, there in zip(body, absent, strict=True):
@@ -257,7 +259,7 @@ def _names_of_the_same(body: Sequence[ast.stmt], absent: Sequence[set[str]]) -> 
     return groups
 
 
-def _handed_on(value: ast.AST | None, absent: set[str]) -> set[str]:
+def _handed_on(value: ast.AST | None, absent: Set[str]) -> set[str]:
     """The names whose objects an expression gives, alone or in a list; what a call gives may hold its arguments.
 
     What modules give that are not `there` holds runs and pictures, and nothing that is graded.
@@ -283,7 +285,7 @@ def _made_and_used(
     effects: Mapping[str, _Effect],
     alike: Mapping[str, set[str]],
     wanted: set[str],
-    absent: set[str],
+    absent: Set[str],
 ) -> tuple[set[str], set[str]]:
     """The names that a statement binds or changes, and those of the notebook that it needs, in functions too."""
     top = symtable.symtable(ast.unparse(statement), "notebook", "exec")
@@ -318,7 +320,7 @@ def _made_and_used(
     return made - {""}, used
 
 
-def _tried(node: ast.AST, wanted: set[str], absent: set[str]) -> Iterator[ast.AST]:
+def _tried(node: ast.AST, wanted: set[str], absent: Set[str]) -> Iterator[ast.AST]:
     """What is graded and handed to an experiment: that is called there, and never where it is graded."""
     if isinstance(node, ast.Call) and followed.root(node.func) in absent:
         given = [*node.args, *(word.value for word in node.keywords)]

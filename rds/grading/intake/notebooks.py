@@ -21,9 +21,10 @@ LARGEST = 16 << 20  # bytes; pictures are in notebooks too
 LARGEST_CODE = 512 << 10  # bytes, of all cells: the parser takes a thousand times as much memory
 INTERFACE = ("control", "derivatives", "advance", "output", "interpolate", "params", "initial_state", "signals")
 _MAGIC = re.compile(r"\s*(?:[%!?]|[\w.]+\?{1,2}\s*$|[A-Za-z_][\w, ]*=\s*[%!])")  # also `files = !ls`
-_TIMED = re.compile(r"\s*%time(?:it)?\s+(?:-\w+\s*\d*\s+)*(.+)")  # what it times is run
+_TIMED = re.compile(r"\s*%time(?:it)?\s+(?:-\w+\s+(?:\d+\s+)?)*(.+)")  # what it times is run
 _FROM_OUTSIDE = re.compile(r"\s*%(?:run|load|loadpy|store\s+-r|macro|recall|rerun)\b[^\n]*")
 _RUNS_THE_CELL = ("%%time", "%%capture", "%%prun")  # as if the line were not there
+_WRITES = re.compile(r"%%(?:writefile|file)\s+(?:-a\s+)?(\S+)")
 _CELL = re.compile(r"# cell \d+")
 _LINES = re.compile(r"\r\n|\r|\n")
 _LONGEST = 8000  # characters of what is graded, in the notes for its author
@@ -57,11 +58,19 @@ def converted(data: bytes, wanted: Sequence[str] = INTERFACE) -> Converted:
     text = "\n".join(lines) + "\n"
     try:
         body = ast.parse(text).body
-        keep, elsewhere = needed(body, set(wanted))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return Converted(_encoded(text), tuple(notes))
+    try:
+        keep, elsewhere = needed(body, set(wanted))
+    except (SyntaxError, ValueError, RecursionError):
         return Converted(_encoded(text), tuple(notes))
     except NotFollowed as fault:
         raise Refusal(_not_followed(lines, fault)) from None
+    except MemoryError:
+        said = f"what its {len(body)} statements do takes too much memory to follow"
+        raise Refusal(f"{said}; hand in a notebook that holds only what is graded") from None
+    if not keep and (written := _written(cells)):
+        raise Refusal(f"{written}, and its code is not run; hand in that file, or take that line away")
     if len(keep) < len(body):
         notes.append(f"of its {len(body)} statements {len(keep)} define what was asked for, and only these are graded")
     if elsewhere:
@@ -81,6 +90,12 @@ def _not_followed(lines: Sequence[str], fault: NotFollowed) -> str:
     place = f"{lines[at][2:]}, line {fault.line - at - 1}"
     said = f"the notebook cannot be graded as what it ran: {place} ({lines[fault.line - 1].strip()[:80]}): {fault.why}"
     return f"{said}; set what is graded in statements of their own, such as params[...] = ..., behind all others"
+
+
+def _written(cells: Sequence[str]) -> str:
+    """Which cell is only written into a file, where IPython does not run it; nothing if there is none."""
+    found = ((number, _WRITES.match(source.lstrip())) for number, source in enumerate(cells, 1))
+    return next((f"cell {number} only writes {match[1]} (%%writefile)" for number, match in found if match), "")
 
 
 def _code_cells(data: bytes) -> list[str]:
