@@ -133,6 +133,8 @@ def test_layers_have_their_names_in_old_code_pages_too(tmp_path: Path) -> None:
     text = path.read_text(encoding="utf-8").replace("$INSUNITS", "$DWGCODEPAGE\n3\nANSI_1252\n9\n$INSUNITS")
     path.write_bytes(text.encode("cp1252"))
     assert read_dxf(path).layers == ["Außen"]
+    path.write_text(text.replace("Außen", "\\U+D800"))  # half of a character, which no terminal can show
+    assert read_dxf(path).curves[0].layer == "?"
     path.write_text(text.replace("Außen", "Au\\U+00DFen"))
     assert read_dxf(path).layers == ["Außen"]
 

@@ -114,12 +114,19 @@ def test_a_clone_of_itself_ends(drawn: Read) -> None:
         '<style>.st0{display:none;} .st1{fill:red}</style><g class="st1 st0"><path d="M0 0H99"/></g>',
         '<style>/* a layer */ #Layer_2, #Layer_3 { display : none }</style><g id="Layer_2"><path d="M0 0H99"/></g>',
         '<path style="display:none !important" d="M0 0H99"/>',
+        '<style>@media screen { .a {display:none} }</style><path class="a" d="M0 0H99"/>',
     ],
 )
 def test_what_is_hidden_is_passed_over_and_told(drawn: Read, other: str) -> None:
     drawing = drawn(BOX + other)
     assert extent(drawing) == pytest.approx([10, 40, 40, 80])
     assert drawing.notes == ["passed over: 1 × hidden objects"]
+
+
+def test_a_style_sheet_without_end_is_read_in_a_moment(drawn: Read) -> None:
+    """It once took the square of its length: hours for these."""
+    drawing = drawn(f"<style>{'/*' * 500_000}</style><style>{'a' * 1_000_000}</style>{BOX}")
+    assert extent(drawing) == pytest.approx([10, 40, 40, 80])
 
 
 def test_what_is_visible_in_a_hidden_group_is_drawn(drawn: Read) -> None:

@@ -90,7 +90,7 @@ def _decoded(data: bytes) -> str:
             text = data.decode(f"cp{page[1].decode()}" if page else "cp1252", "replace")
         except LookupError:
             text = data.decode("cp1252", "replace")
-    return _ESCAPED.sub(lambda match: chr(int(match[1], 16)), text)
+    return _ESCAPED.sub(lambda match: chr(int(match[1], 16)), text).encode("utf-8", "replace").decode()  # no halves
 
 
 def _pairs(text: str, name: str) -> Pairs:

@@ -27,7 +27,6 @@ _PASSED_OVER = {
     "foreignObject": "foreign content",
 }
 _XLINK = "{http://www.w3.org/1999/xlink}"
-_RULE = re.compile(r"([^{}]+)\{([^{}]*)\}")
 _ASPECT = re.compile(r"x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?")
 _SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}  # of the room that is left, before the drawing
 _NOT_DRAWN = ("defs", "metadata", "clipPath", "mask", "marker", "pattern", "symbol", "style", "title", "desc")
@@ -117,9 +116,12 @@ def _hiding_rules(root: ElementTree.Element) -> dict[str, dict[str, str]]:
     found: dict[str, dict[str, str]] = {}
     for element in root.iter():
         if _tag(element) == "style":
-            for selectors, body in _RULE.findall(re.sub(r"/\*.*?\*/", "", element.text or "", flags=re.DOTALL)):
+            # by splitting: expressions that look for ends take the square of the length where there is none
+            first, *commented = (element.text or "").split("/*")
+            for rule in (first + "".join(text.partition("*/")[2] for text in commented)).split("}"):
+                selectors, _, body = rule.rpartition("{")
                 said = {key: value for key, value in _declared(body).items() if key in ("display", "visibility")}
-                for selector in selectors.split(",") if said else ():
+                for selector in selectors.rpartition("{")[2].split(",") if said else ():
                     found.setdefault(selector.strip(), {}).update(said)
     return found
 
