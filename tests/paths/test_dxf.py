@@ -12,6 +12,7 @@ import pytest
 from rds.core.errors import InputError
 from rds.nc.shapes.curves import Drawing
 from rds.nc.shapes.dxf import read_dxf
+from rds.nc.shapes.files import read_vector_drawing
 
 Read = Callable[..., Drawing]
 HEADER = "0 SECTION 2 HEADER 9 $INSUNITS 70 4 0 ENDSEC"
@@ -160,3 +161,20 @@ def test_a_unit_that_parts_do_not_have_can_be_given(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="= 20 is no unit of drawings of parts; give its unit"):
         read_dxf(path)
     assert extent(read_dxf(path, "cm")) == pytest.approx([0, 0, 10, 10])
+
+
+@pytest.mark.parametrize(
+    ("entity", "why"),
+    [
+        ("0 ARC 8 a 10 0 20 0 40 1e20 50 0 51 90", "an arc of radius 1e.20 mm takes more than 2000000 chords"),
+        ("0 LINE 8 a 10 0 20 x", "group 20 of a DXF entity is 'x', not a number"),
+    ],
+)
+def test_what_is_refused_is_told_with_the_file(tmp_path: Path, entity: str, why: str) -> None:
+    path = written(tmp_path / "part.dxf", section("ENTITIES", entity))
+    with pytest.raises(InputError, match=rf"part\.dxf: {why}"):
+        read_vector_drawing(str(path))
+
+
+def test_an_arc_that_is_as_good_as_straight_is_a_line(drawn: Read) -> None:
+    assert len(drawn("0 LWPOLYLINE 8 a 70 0 10 0 20 0 42 1e-18 10 10 20 0").curves[0].points) == 2

@@ -10,6 +10,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.nc.shapes.curves import Drawing
+from rds.nc.shapes.files import read_vector_drawing
 from rds.nc.shapes.svg import read_svg
 
 Read = Callable[..., Drawing]
@@ -146,3 +147,13 @@ def test_what_is_visible_in_a_hidden_group_is_drawn(drawn: Read) -> None:
 def test_what_is_not_done_to_an_object_is_told(drawn: Read, attribute: str, told: str) -> None:
     notes = drawn(f"<g {attribute}>{BOX}</g>").notes
     assert len(notes) == 1 and told in notes[0]
+
+
+@pytest.mark.parametrize(
+    "inner", ['<circle r="1e300"/>', '<path d="M0 0 A 1e20 1e20 0 0 1 5 5"/>', '<path d="M0 0L1e999 5"/>']
+)
+def test_numbers_too_large_for_a_drawing_are_refused(tmp_path: Path, inner: str) -> None:
+    path = tmp_path / "part.svg"
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {SIZE}>{inner}</svg>')
+    with pytest.raises(InputError, match=r"part\.svg: .*correct it"):
+        read_vector_drawing(str(path))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from math import acos, ceil, pi
+from math import asin, ceil, pi, sqrt
 
 import numpy as np
 
@@ -54,7 +54,12 @@ def steps_of(radius: float, sweep: float, chord_error: float = CHORD_ERROR) -> i
     """How many chords an arc of `radius` (mm) and `sweep` (rad) is divided into, so that they keep within the error."""
     if radius <= chord_error:
         return 4
-    return max(ceil(abs(sweep) / (2.0 * acos(1.0 - chord_error / radius))), 2)
+    count = abs(sweep) / (4.0 * asin(sqrt(chord_error / radius / 2.0)))  # acos(1 - error / radius) is 0 for large radii
+    if not count <= MOST_POINTS:
+        raise InputError(
+            f"an arc of radius {radius:g} mm takes more than {MOST_POINTS} chords; correct it, or leave it out"
+        )
+    return max(ceil(count), 2)
 
 
 def arc_points(x: float, y: float, radius: float, first: float, sweep: float) -> np.ndarray:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from math import atan, atan2, cos, hypot, isfinite, pi, radians, sin
+from math import atan, atan2, cos, hypot, pi, radians, sin
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,16 @@ from rds.nc.shapes.curves import (
     joined,
     polyline_curve,
     steps_of,
+)
+from rds.nc.shapes.dxf_groups import (
+    Pairs,
+    entities_of,
+    number_of,
+    numbers_of,
+    places_of,
+    sections_of,
+    text_of,
+    value_of,
 )
 
 _LARGEST = 128 << 20  # bytes
@@ -45,11 +54,8 @@ _PASSED_OVER = {
     "HATCH": "hatches",
 }
 DEEPEST = 16  # blocks within one another
-_CODE_PAGE = re.compile(rb"\$DWGCODEPAGE\s+3\s+ANSI_([0-9]+)")
-_ESCAPED = re.compile(r"\\U\+([0-9A-Fa-f]{4})")
 _MESH, _FRAME, _SPACE = 16 | 64, 16, 8  # flags of a POLYLINE and of its VERTEX: meshes, control points, in space
 _IN_SPACE = ("LINE", "POINT", "ELLIPSE", "SPLINE")  # their places are those of the drawing, whatever their extrusion
-Pairs = list[tuple[int, str]]
 
 
 def read_dxf(path: Path, unit: str | None = None) -> Drawing:
@@ -69,62 +75,20 @@ def read_dxf(path: Path, unit: str | None = None) -> Drawing:
         raise InputError(f"cannot be read: {error.strerror or error}; name a drawing", name) from error
     if data.startswith(b"AutoCAD Binary DXF"):
         raise InputError("is a binary DXF; save it as ASCII DXF (R12 or later)", name)
-    pairs = _pairs(_decoded(data), name)
-    sections = _sections(pairs)
+    sections = sections_of(data, name)
     if "ENTITIES" not in sections:
         raise InputError("has no ENTITIES section; save it as ASCII DXF (R12 or later)", name)
     scale = UNITS[unit] if unit else _scale(sections.get("HEADER", []), name)
     reader = _Reader(name, scale, _blocks(sections.get("BLOCKS", [])), _off(sections.get("TABLES", [])))
-    reader.take(_entities(sections["ENTITIES"]), np.array([[scale, 0.0, 0.0], [0.0, scale, 0.0]]), None, 0)
+    reader.take(entities_of(sections["ENTITIES"]), np.array([[scale, 0.0, 0.0], [0.0, scale, 0.0]]), None, 0)
     notes = [f"passed over: {count} × {what}" for what, count in reader.passed_over.items()]
     return Drawing(joined(reader.curves), name, notes)
-
-
-def _decoded(data: bytes) -> str:
-    """The text: UTF-8 since 2007, before that in the code page that the header names."""
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        page = _CODE_PAGE.search(data)
-        try:
-            text = data.decode(f"cp{page[1].decode()}" if page else "cp1252", "replace")
-        except LookupError:
-            text = data.decode("cp1252", "replace")
-    return _ESCAPED.sub(lambda match: chr(int(match[1], 16)), text).encode("utf-8", "replace").decode()  # no halves
-
-
-def _pairs(text: str, name: str) -> Pairs:
-    lines = re.split(r"\r\n?|\n", text)  # not splitlines(): texts may have other separators in them
-    found: Pairs = []
-    for k in range(0, len(lines) - 1, 2):
-        code = lines[k].strip()
-        if not re.fullmatch("-?[0-9]{1,5}", code):
-            raise InputError(f"{code[:40]!r} is no group code; save it as ASCII DXF (R12 or later)", f"{name}:{k + 1}")
-        found.append((int(code), lines[k + 1].strip()))
-        if found[-1] == (0, "EOF"):
-            break
-    if not found:
-        raise InputError("is empty; save it as ASCII DXF (R12 or later)", name)
-    return found
-
-
-def _sections(pairs: Pairs) -> dict[str, Pairs]:
-    found: dict[str, Pairs] = {}
-    current: Pairs | None = None
-    for k, (code, value) in enumerate(pairs):
-        if code == 0 and value == "SECTION":
-            current = found.setdefault(pairs[k + 1][1] if k + 1 < len(pairs) else "", [])
-        elif code == 0 and value in ("ENDSEC", "EOF"):
-            current = None
-        elif current is not None:
-            current.append((code, value))
-    return found
 
 
 def _scale(header: Pairs, name: str) -> float:
     for k, (code, value) in enumerate(header):
         if code == 9 and value == "$INSUNITS" and k + 1 < len(header):
-            units = int(_number([header[k + 1]], header[k + 1][0]))
+            units = int(number_of([header[k + 1]], header[k + 1][0]))
             if units in _MM:
                 return _MM[units]
             if units:
@@ -135,27 +99,14 @@ def _scale(header: Pairs, name: str) -> float:
     raise InputError("does not say its unit ($INSUNITS); give it (unit: mm, cm, m or in)", name)
 
 
-def _entities(pairs: Pairs) -> Iterator[tuple[str, Pairs]]:
-    kind, body = "", []  # type: str, Pairs
-    for code, value in pairs:
-        if code == 0:
-            if kind:
-                yield kind, body
-            kind, body = value, []
-        else:
-            body.append((code, value))
-    if kind:
-        yield kind, body
-
-
 def _blocks(pairs: Pairs) -> dict[str, tuple[tuple[float, float], list[tuple[str, Pairs]]]]:
     found: dict[str, tuple[tuple[float, float], list[tuple[str, Pairs]]]] = {}
     inside: list[tuple[str, Pairs]] | None = None
-    for kind, body in _entities(pairs):
+    for kind, body in entities_of(pairs):
         if kind == "BLOCK":
             inside = []
-            base = (_number(body, 10, 0.0), _number(body, 20, 0.0))
-            found[_text(body, 2).lower()] = (base, inside)  # names of DXF differ by more than their case
+            base = (number_of(body, 10, 0.0), number_of(body, 20, 0.0))
+            found[text_of(body, 2).lower()] = (base, inside)  # names of DXF differ by more than their case
         elif kind == "ENDBLK":
             inside = None
         elif inside is not None:
@@ -166,39 +117,10 @@ def _blocks(pairs: Pairs) -> dict[str, tuple[tuple[float, float], list[tuple[str
 def _off(tables: Pairs) -> set[str]:
     """Layers that are switched off or frozen, in lower case."""
     return {
-        _text(body, 2).lower()
-        for kind, body in _entities(tables)
-        if kind == "LAYER" and (_number(body, 62, 7.0) < 0 or int(_number(body, 70, 0.0)) & 1)
+        text_of(body, 2).lower()
+        for kind, body in entities_of(tables)
+        if kind == "LAYER" and (number_of(body, 62, 7.0) < 0 or int(number_of(body, 70, 0.0)) & 1)
     }
-
-
-def _text(body: Pairs, code: int, default: str = "") -> str:
-    return next((value for key, value in body if key == code), default)
-
-
-def _number(body: Pairs, code: int, default: float = 0.0) -> float:
-    text = _text(body, code)
-    return _value(code, text) if text else default
-
-
-def _value(code: int, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not isfinite(value):
-        raise InputError(f"group {code} of a DXF entity is {text[:40]!r}, not a number; save the drawing again")
-    return value
-
-
-def _all(body: Pairs, code: int) -> list[float]:
-    return [_value(code, value) for key, value in body if key == code]
-
-
-def _places(body: Pairs, code: int) -> np.ndarray:
-    """The places x, y in the groups `code` and `code` + 10; none where there are not as many of both."""
-    x, y = _all(body, code), _all(body, code + 10)
-    return np.column_stack((x, y)) if len(x) == len(y) else np.empty((0, 2))
 
 
 def _sweep(first: float, last: float) -> float:
@@ -236,26 +158,26 @@ class _Reader:
         line, line_layer = None, ""  # type: Pairs | None, str  # a POLYLINE, whose VERTEX entities follow it
         vertices: list[tuple[float, float, float]] = []
         for kind, body in entities:
-            layer = _text(body, 8, "0")
+            layer = text_of(body, 8, "0")
             layer = on if on is not None and layer == "0" else layer
             if kind == "VERTEX":
-                if line is not None and not int(_number(body, 70)) & _FRAME:
-                    vertices.append((_number(body, 10), _number(body, 20), _number(body, 42)))
+                if line is not None and not int(number_of(body, 70)) & _FRAME:
+                    vertices.append((number_of(body, 10), number_of(body, 20), number_of(body, 42)))
             elif kind == "SEQEND":
                 if line is not None and vertices:
                     self._polyline(vertices, line, line_layer, m)
                 line = None
             elif layer.lower() in self.off:
                 self._pass_over("objects of hidden layers")
-            elif int(_number(body, 67)) == 1:
+            elif int(number_of(body, 67)) == 1:
                 if kind != "VIEWPORT":
                     self._pass_over("objects on sheets of paper (draw in model space what is to be cut)")
-            elif int(_number(body, 60)) == 1:
+            elif int(number_of(body, 60)) == 1:
                 self._pass_over("hidden objects")
             elif kind not in _IN_SPACE and self._tilted(kind, body):
                 self._pass_over("objects that do not lie in the plane XY")
             elif kind == "POLYLINE":
-                if int(_number(body, 70)) & _MESH:
+                if int(number_of(body, 70)) & _MESH:
                     self._pass_over("meshes")
                 else:
                     line, vertices, line_layer = body, [], layer
@@ -263,36 +185,36 @@ class _Reader:
                 self._entity(kind, body, layer, m, depth)
 
     def _tilted(self, kind: str, body: Pairs) -> bool:
-        if kind == "POLYLINE" and int(_number(body, 70)) & _SPACE:
+        if kind == "POLYLINE" and int(number_of(body, 70)) & _SPACE:
             return False
-        return hypot(_number(body, 210), _number(body, 220)) > 1e-6
+        return hypot(number_of(body, 210), number_of(body, 220)) > 1e-6
 
     def _polyline(self, vertices: list[tuple[float, float, float]], body: Pairs, layer: str, m: np.ndarray) -> None:
-        flags = int(_number(body, 70))
+        flags = int(number_of(body, 70))
         m = m if flags & _SPACE else _mirrored(body, m)
         self._add(_bulged(vertices, bool(flags & 1), _size(m)), bool(flags & 1), layer, m)
 
     def _entity(self, kind: str, body: Pairs, layer: str, m: np.ndarray, depth: int) -> None:
-        x, y = _number(body, 10), _number(body, 20)
+        x, y = number_of(body, 10), number_of(body, 20)
         if kind not in _IN_SPACE:
             m = _mirrored(body, m)
         if kind == "LINE":
-            self._add(np.array([[x, y], [_number(body, 11), _number(body, 21)]]), False, layer, m)
+            self._add(np.array([[x, y], [number_of(body, 11), number_of(body, 21)]]), False, layer, m)
         elif kind == "POINT":
             self._circle(x, y, 0.0, layer, m)
         elif kind == "CIRCLE":
-            self._circle(x, y, abs(_number(body, 40)), layer, m)
+            self._circle(x, y, abs(number_of(body, 40)), layer, m)
         elif kind == "ARC":
-            first, last = radians(_number(body, 50)), radians(_number(body, 51))
-            self._add(_arc(x, y, _number(body, 40), first, _sweep(first, last), _size(m)), False, layer, m)
+            first, last = radians(number_of(body, 50)), radians(number_of(body, 51))
+            self._add(_arc(x, y, number_of(body, 40), first, _sweep(first, last), _size(m)), False, layer, m)
         elif kind == "LWPOLYLINE":
-            closed = bool(int(_number(body, 70)) & 1)
+            closed = bool(int(number_of(body, 70)) & 1)
             self._add(_bulged(_lightweight(body), closed, _size(m)), closed, layer, m)
         elif kind == "ELLIPSE":
             self._add(_ellipse(body, _size(m)), False, layer, m)
         elif kind == "SPLINE":
-            self._add(_spline(body, _size(m), self.name), bool(int(_number(body, 70)) & 1), layer, m)
-            if not len(_places(body, 10)):
+            self._add(_spline(body, _size(m), self.name), bool(int(number_of(body, 70)) & 1), layer, m)
+            if not len(places_of(body, 10)):
                 self._pass_over("the shape of a spline with fit points alone: straight lines go through them")
         elif kind == "INSERT":
             self._insert(body, layer, m, depth)
@@ -300,19 +222,19 @@ class _Reader:
             self._pass_over(_PASSED_OVER.get(kind, f"{kind} (no curve of the plane)"))
 
     def _insert(self, body: Pairs, layer: str, m: np.ndarray, depth: int) -> None:
-        block = self.blocks.get(_text(body, 2).lower())
+        block = self.blocks.get(text_of(body, 2).lower())
         if block is None or depth >= DEEPEST:
             self._pass_over("inserts of blocks that are not in the file")
             return
         (bx, by), entities = block
-        angle, sx, sy = radians(_number(body, 50)), _number(body, 41, 1.0), _number(body, 42, 1.0)
+        angle, sx, sy = radians(number_of(body, 50)), number_of(body, 41, 1.0), number_of(body, 42, 1.0)
         c, s = cos(angle), sin(angle)
         turn = np.array([[c * sx, -s * sy], [s * sx, c * sy]])
-        place = np.array([_number(body, 10), _number(body, 20)]) - turn @ np.array([bx, by])
-        columns, rows = (max(int(_number(body, code, 1.0)), 1) for code in (70, 71))
+        place = np.array([number_of(body, 10), number_of(body, 20)]) - turn @ np.array([bx, by])
+        columns, rows = (max(int(number_of(body, code, 1.0)), 1) for code in (70, 71))
         for k in range(columns * rows):  # an array: its distances turn with the insert, and are not scaled by it
             self._count(50)
-            dx, dy = k % columns * _number(body, 44), k // columns * _number(body, 45)
+            dx, dy = k % columns * number_of(body, 44), k // columns * number_of(body, 45)
             at = place + np.array([c * dx - s * dy, s * dx + c * dy])
             self.take(entities, np.column_stack((m[:, :2] @ turn, m[:, :2] @ at + m[:, 2])), layer, depth + 1)
 
@@ -335,7 +257,7 @@ class _Reader:
 
 def _mirrored(body: Pairs, m: np.ndarray) -> np.ndarray:
     """m for an entity in a plane of its own: one that is seen from below (its extrusion goes down) has X mirrored."""
-    return np.column_stack((-m[:, 0], m[:, 1:])) if _number(body, 230, 1.0) < 0 else m
+    return np.column_stack((-m[:, 0], m[:, 1:])) if number_of(body, 230, 1.0) < 0 else m
 
 
 def _arc(x: float, y: float, r: float, first: float, sweep: float, size: float) -> np.ndarray:
@@ -346,9 +268,9 @@ def _lightweight(body: Pairs) -> list[tuple[float, float, float]]:
     found: list[list[float]] = []
     for code, value in body:
         if code == 10:
-            found.append([_value(code, value), 0.0, 0.0])
+            found.append([value_of(code, value), 0.0, 0.0])
         elif code in (20, 42) and found:
-            found[-1][1 if code == 20 else 2] = _value(code, value)
+            found[-1][1 if code == 20 else 2] = value_of(code, value)
     return [(x, y, bulge) for x, y, bulge in found]
 
 
@@ -362,7 +284,7 @@ def _bulged(vertices: list[tuple[float, float, float]], closed: bool, scale: flo
             continue
         ex, ey, _ = vertices[(k + 1) % n]
         chord, sweep = hypot(ex - x, ey - y), 4.0 * atan(bulge)
-        if chord == 0.0:
+        if chord == 0.0 or abs(bulge) * chord * scale / 2.0 < CHORD_ERROR / 1000.0:  # as good as straight
             continue
         r = chord / 2.0 / abs(sin(sweep / 2.0))
         away = chord / 2.0 / np.tan(sweep / 2.0)
@@ -377,9 +299,9 @@ def _bulged(vertices: list[tuple[float, float, float]], closed: bool, scale: flo
 
 
 def _ellipse(body: Pairs, scale: float) -> np.ndarray:
-    x, y, mx, my = (_number(body, code) for code in (10, 20, 11, 21))
-    ratio, first, last = _number(body, 40, 1.0), _number(body, 41), _number(body, 42, 2 * pi)
-    if _number(body, 230, 1.0) < 0:
+    x, y, mx, my = (number_of(body, code) for code in (10, 20, 11, 21))
+    ratio, first, last = number_of(body, 40, 1.0), number_of(body, 41), number_of(body, 42, 2 * pi)
+    if number_of(body, 230, 1.0) < 0:
         ratio = -ratio
     sweep = _sweep(first, last)
     angle = first + np.linspace(0.0, sweep, steps_of(hypot(mx, my) * scale, sweep) + 1)
@@ -389,9 +311,9 @@ def _ellipse(body: Pairs, scale: float) -> np.ndarray:
 
 def _spline(body: Pairs, scale: float, name: str) -> np.ndarray:
     """A (rational) B-spline by de Boor's recursion; one of fit points alone as lines through them."""
-    degree = int(_number(body, 71, 3.0))
-    knots, weights = np.array(_all(body, 40)), np.array(_all(body, 41))
-    control, fit = _places(body, 10), _places(body, 11)
+    degree = int(number_of(body, 71, 3.0))
+    knots, weights = np.array(numbers_of(body, 40)), np.array(numbers_of(body, 41))
+    control, fit = places_of(body, 10), places_of(body, 11)
     n = len(control)
     if n == 0 and len(fit):
         return fit
@@ -402,6 +324,8 @@ def _spline(body: Pairs, scale: float, name: str) -> np.ndarray:
     spans = np.unique(knots[degree : n + 1])
     bend = np.abs(np.diff(control, n=2, axis=0)).max() * scale if n > 2 else 0.0
     per_span = int(min(max(np.ceil(np.sqrt(degree * degree * bend / (8 * CHORD_ERROR))), 2), 2000))
+    if len(spans) * per_span > MOST_POINTS:
+        raise InputError(f"a spline takes more than {MOST_POINTS} points; explode it into lines", name)
     u = np.append((spans[:-1, None] + np.diff(spans)[:, None] * np.arange(per_span) / per_span).ravel(), spans[-1])
     k = np.clip(np.searchsorted(knots, u, side="right") - 1, degree, n - 1)
     d = [rows[k - degree + j] for j in range(degree + 1)]

@@ -17,8 +17,13 @@ def read_vector_drawing(file: str, unit: str | None = None) -> Drawing:
     """
     path = Path(file)
     ending = path.suffix.lower()
-    if ending == ".svg":
-        return checked(read_svg(path))
-    if ending == ".dxf":
-        return checked(read_dxf(path, unit))
+    try:
+        if ending == ".svg":
+            return checked(read_svg(path))
+        if ending == ".dxf":
+            return checked(read_dxf(path, unit))
+    except ArithmeticError as error:
+        raise InputError("holds a number too large for a drawing; correct it, or save it again", str(path)) from error
+    except InputError as error:
+        raise error if error.where else InputError(str(error), str(path)) from error
     raise InputError(f"{ending or 'a name without an ending'} is no vector drawing; known: .svg, .dxf", str(path))
