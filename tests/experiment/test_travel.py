@@ -25,3 +25,8 @@ def test_a_run_that_leaves_the_travel_is_told(tmp_path: Path, error: str, is_tol
     told = [note for note in result.meta["notes"] if "beyond its travel of -75 to 75 mm" in note]
     assert bool(told) is is_told
     assert bool(abs(result["X_measured"]).max() > 75.0) is is_told
+
+
+def test_where_no_law_drives_the_signal_is_to_be_looked_at() -> None:
+    result = Experiment(signal={"kind": "constant", "value": 5.0}, duration=10.0).run()
+    assert [note.rpartition("look at ")[2] for note in result.meta["notes"]] == ["the signal"]

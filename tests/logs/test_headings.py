@@ -178,6 +178,10 @@ def test_channels_of_a_scope_end_one_after_another(tmp_path: Path) -> None:
     assert [f.what[:5] for f in table.findings] == ["Slow:"]  # its factor may be applied or not: the file does not tell
     (log,) = read_log(path)
     assert np.allclose(log.position, X, atol=1e-6) and np.allclose(log.command, U, atol=1e-6)
+    path.write_text(path.read_text(encoding="utf-8").removesuffix("\nEOF\n")[:-5], encoding="utf-8")  # within a number
+    cut = read_table(path)
+    assert len(cut.columns["CmdVolt"].values) == 799
+    assert "it ends in the middle of a line" in " ".join(finding.what for finding in cut.findings)
 
 
 @pytest.mark.parametrize(

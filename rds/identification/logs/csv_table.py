@@ -335,11 +335,12 @@ def _end(path: Path, layout: Layout) -> tuple[int, Finding | None]:
     if tail.endswith((b"\n", b"\r")):
         return size, None
     *before, last = tail.rstrip(b" \t").split(b"\n")
-    if layout.ragged:
+    if layout.ragged and last.strip() == _END:
         return size, None
     others = [line for line in before[1:] if line.strip()]
     cells = len(split(last.decode(layout.encoding, "replace"), layout.delimiter))
-    if others and (cells < len(layout.names) or len(last) < min(map(len, others)) - 1):  # a \r is no character of a row
+    # rows that end with their channels tell nothing by their length; a \r is no character of a row
+    if others and (layout.ragged or cells < len(layout.names) or len(last) < min(map(len, others)) - 1):
         what = f"it ends in the middle of a line ({last.decode(layout.encoding, 'replace')[:40]!r}): the file is cut. "
         return size - len(tail) + tail.rindex(b"\n") + 1, Finding(
             "cut", what + "The last line is left out; check that the rest is as long as the recording", Gravity.WARNING

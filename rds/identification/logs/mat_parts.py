@@ -43,7 +43,7 @@ def parts_of(name: str, values: Any, depth: int = 0) -> Iterator[Part]:
         yield Part(name, None, of_class)
     elif not isinstance(values, np.ndarray) or depth > _DEEPEST:  # a sparse matrix
         yield Part(name, None)
-    elif values.dtype.names and values.size <= _MOST_STRUCTS:
+    elif values.dtype.names and 0 < values.size <= _MOST_STRUCTS:
         for element, record in zip(_names(name, values), values.reshape(-1), strict=True):
             for field in values.dtype.names:
                 yield from parts_of(f"{element}.{field}", record[field], depth + 1)

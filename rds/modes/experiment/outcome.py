@@ -53,13 +53,14 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
 def _beyond_travel(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
     """A sentence for each axis that was beyond its travel, which an unstable law does first of all."""
     said = []
-    for axis in (part.axis for part in plan.axes):
+    for part in plan.axes:
+        axis = part.axis
         measured = columns.get(f"{axis.name}_measured", np.empty(0))
         low, high = axis.travel
         if axis.unit == "rev/min" or not ((measured < low) | (measured > high)).any():  # of a spindle it is a speed
             continue
         there = f"{np.nanmin(measured):.4g} to {np.nanmax(measured):.4g} {axis.unit}"
-        cause = "the signal" if plan.mode.startswith("system") else "the sign and the gains of the law"
+        cause = "the signal" if part.signal is not None else "the sign and the gains of the law"
         said.append(
             f"{axis.name} was at {there}, beyond its travel of {low:g} to {high:g} {axis.unit}; look at {cause}"
         )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from rds.core.errors import InputError
 from rds.nc.shapes.curves import Drawing, checked
 from rds.nc.shapes.dxf import read_dxf
@@ -18,10 +20,11 @@ def read_vector_drawing(file: str, unit: str | None = None) -> Drawing:
     path = Path(file)
     ending = path.suffix.lower()
     try:
-        if ending == ".svg":
-            return checked(read_svg(path))
-        if ending == ".dxf":
-            return checked(read_dxf(path, unit))
+        with np.errstate(over="ignore", invalid="ignore"):  # which `checked` looks for
+            if ending == ".svg":
+                return checked(read_svg(path))
+            if ending == ".dxf":
+                return checked(read_dxf(path, unit))
     except ArithmeticError as error:
         raise InputError("holds a number too large for a drawing; correct it, or save it again", str(path)) from error
     except InputError as error:
