@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cloudpickle
+import pytest
 
 from rds.core.load import load_student
 from rds.core.portable import portable
@@ -25,3 +27,12 @@ def test_threads_that_pack_at_the_same_time_do_not_disturb_each_other(tmp_path: 
         sys.setswitchinterval(before)
     assert len(set(packed)) == 1
     assert not cloudpickle.list_registry_pickle_by_value()
+
+
+def test_an_error_in_code_that_travelled_names_the_file_it_was_written_in(tmp_path: Path) -> None:
+    path = tmp_path / "law.py"
+    path.write_text("def control(t, r, y, state, params):\n    return [undefined for _ in range(2)], state\n")
+    travelled = pickle.loads(portable(load_student(path).functions["control"]))
+    with pytest.raises(NameError) as raised:
+        travelled(0.0, None, 0.0, [], {})
+    assert {entry.path for entry in raised.traceback[1:]} == {path}
