@@ -285,11 +285,11 @@ def _decode(data: bytes, file: Path) -> str:
         except SyntaxError:  # no encoding that Python knows is declared, and the first lines are not UTF-8
             encoding = "utf-8-sig"
         return data.decode(encoding)
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        bad = data[error.start : error.start + 1]
-        raise InputError(f"byte {bad!r} is not UTF-8 text; save it as UTF-8", f"{file}:{line}") from error
     except (LookupError, UnicodeError) as error:  # Python knows it, but not as an encoding of text, or not of this one
+        if isinstance(error, UnicodeDecodeError) and encoding.startswith("utf-8"):
+            line = data[: error.start].count(b"\n") + 1
+            bad = data[error.start : error.start + 1]
+            raise InputError(f"byte {bad!r} is not UTF-8 text; save it as UTF-8", f"{file}:{line}") from error
         raise InputError(
             f"its text cannot be read as the {encoding!r} that it declares; save it as UTF-8", str(file)
         ) from error

@@ -135,8 +135,8 @@ def variables(path: Path) -> dict[str, Any]:
     with _mat_errors(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that objects of a class have no name for scipy
         found = dict(loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True))
-    if mat5.objects(path):
-        found.pop("None", None)
+    for name in mat5.objects(path):  # by their names from scipy 1.18 on, before that as "None"
+        found.pop(name if name in found else "None", None)
     return found
 
 

@@ -77,6 +77,7 @@ def test_a_helper_with_the_name_of_an_interface_is_left_alone(write):
         (b"z = '\xe9'\n", ["mine.py:1", "UTF-8"]),
         ("# coding: rot13\n", ["mine.py", "'rot13' that it declares; save it as UTF-8"]),
         ("# coding: punycode\nx = 1\n", ["mine.py", "'punycode' that it declares"]),
+        (b"# coding: ascii\nx = '\xc3\xa9'\n", ["mine.py", "'ascii' that it declares"]),
         ("def f():\n    return 1 / 0\n\nf()\n", ["mine.py:2", "in f: ZeroDivisionError", "`return 1 / 0`"]),
         ("import sys\nsys.exit(3)\n", ["mine.py:2", "remove the exit"]),
         ("import no_such_module_here\n", ["mine.py:1", "install no_such_module_here"]),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import pickle
 import sys
+from contextlib import suppress
 from typing import IO, Any
 
 from rds.core.errors import RdsError
@@ -24,6 +25,8 @@ def main() -> None:
     end_with_parent()
     answers = os.fdopen(os.dup(1), "wb")
     serve(sys.stdin.buffer, answers)
+    with suppress(BrokenPipeError):  # what nobody reads any more; Python would say so on stderr as it ends
+        answers.close()
 
 
 def serve(questions: IO[bytes], answers: IO[bytes]) -> None:

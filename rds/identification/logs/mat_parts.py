@@ -11,6 +11,7 @@ import numpy as np
 _MOST_COLUMNS = 1000  # of a matrix; a picture is no log
 _DEEPEST = 20  # structs in structs
 _MOST_STRUCTS = 1000  # in an array
+_CLASS = ("_Class", "s2")  # the field of scipy's in which an object's class is, from 1.18 on and before
 _LABELS = ("label", "Name", "name")  # of Simulink's and dSPACE's structs
 
 
@@ -73,8 +74,11 @@ def _class_of(values: Any) -> str:
         return ""
     if isinstance(values, matlab.MatlabObject):
         return str(values.classname)
-    if isinstance(values, matlab.MatlabOpaque) and values.size and "s2" in (values.dtype.names or ()):
-        name = values.reshape(-1)[0]["s2"]
+    if not isinstance(values, matlab.MatlabOpaque):
+        return ""
+    fields = [name for name in _CLASS if name in (values.dtype.names or ())]
+    if values.size and fields:
+        name = values.reshape(-1)[0][fields[0]]
         text = name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
         return text[:60] if text.isprintable() else "unknown"
     return ""

@@ -3,6 +3,8 @@
 # ruff: noqa: E501 - an attack is easier to read on the line on which it is written
 from __future__ import annotations
 
+import sys
+
 from rds.grading.grade import Status
 from tests.grading.attacks import Attack, in_control
 
@@ -112,8 +114,7 @@ ATTACKS = {
     "recursion": Attack(in_control("f = lambda: f()\nf()"), CONTRACT, "RecursionError"),
     "recursion without a limit": Attack(
         "import sys; sys.setrecursionlimit(10 ** 9)\nclass R:\n    def __getattr__(self, name): return getattr(self, name)\nR().x",
-        KILLED,
-        "SIGSEGV",
+        *((KILLED, "SIGSEGV") if sys.version_info < (3, 12) else (LOAD, "RecursionError")),  # since, C has a limit
     ),
     "recursion in the answer": Attack(in_control("a = []\na.append(a)\nreturn a, 6"), CONTRACT, "finite number"),
     "clocks that stand still": Attack(
