@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import gc
 import os
 import shutil
 import signal
@@ -42,6 +43,8 @@ settings.load_profile("same")
 
 pytest_plugins = ["held_up", "skipped"]
 
+gc.disable()  # until all tests are collected, which is garbage at the end of the run only
+
 HERE = Path(__file__).parent
 PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one
 POLITE = 10  # niceness of the others
@@ -65,6 +68,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     first = (REALTIME, PANELS)
     rank = {group: (group not in first, -sizes[group], group) for group in sizes}
     items.sort(key=lambda item: rank[group_of(item.nodeid)])
+
+
+def pytest_collection_finish() -> None:
+    """What was collected is half a million objects, which no later collection of garbage goes through."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:

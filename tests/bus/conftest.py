@@ -52,7 +52,6 @@ def nothing_left_open(runtime_directory: Path) -> Iterator[None]:
     gc.collect()
     # type(), for canopen's placeholder of a network raises whatever is asked of it
     buses = [thing for thing in gc.get_objects() if issubclass(type(thing), can.BusABC) and not thing._is_shutdown]
-    gc.unfreeze()
     for bus in buses:
         bus.shutdown()
     assert not children, f"left running: {children}"
