@@ -16,7 +16,7 @@ from rds.checks.exercise import LinearAxis, references
 from rds.checks.memory import judge_memory
 from rds.checks.replay import Call
 from rds.checks.report import CheckReport, Findings, Timing
-from rds.checks.timing import judge_time
+from rds.checks.timing import Work, judge_time
 from rds.checks.values import same, size
 from rds.core.adapt import as_controller, is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error
@@ -72,7 +72,6 @@ class _Run:
         self.calls: list[Call] = []
         self.ns: list[int] = []
         self.sizes: list[int] = []
-        self.busy = 1.0
 
     def check(self) -> None:
         found, student = self.found, self.subject.student
@@ -90,6 +89,7 @@ class _Run:
         except Exception as error:
             said = f"{error}: keep numbers, lists, dicts and arrays in initial_state and params"
             return found.fault(clauses.SAVED_STATE, said)
+        self.work = Work()
         with judge_memory(found, "control()", self.subject, "control", clauses.MEMORY, self.budget) as memory:
             self._drive()
             memory.calls, memory.params = self.calls, self.params
@@ -98,7 +98,7 @@ class _Run:
             self._probe()
         best = [min(ns, memory.ns.get(k, ns)) for k, ns in enumerate(self.ns)]
         first = min(self.ns[0], memory.first_ns or self.ns[0]) if self.ns else 0
-        self.timing = judge_time(found, "control()", best, first, self.busy, self.T)
+        self.timing = judge_time(found, "control()", best, first, self.work.close(), self.T)
 
     def _drive(self) -> None:
         """Close the loop around it, and keep every call."""
@@ -106,7 +106,7 @@ class _Run:
         state = copy.deepcopy(self.initial_state)
         table = references(self.T)
         plants = [LinearAxis(self.T) for _ in range(max(1, self.axes))]
-        end, wall, busy = time.monotonic() + self.budget, 0, 0
+        end = time.monotonic() + self.budget
         for k in range(len(table)):
             if k >= _LEAST and time.monotonic() > end:
                 break
@@ -119,15 +119,14 @@ class _Run:
                     f"next_state {shown(state)} cannot be copied ({error}); keep numbers, lists, dicts and arrays in it"
                 )
                 return self.found.fault(clauses.SAVED_STATE, said)
-            cpu, started = time.thread_time_ns(), time.perf_counter_ns()
+            self.work.begin()
+            started = time.perf_counter_ns()
             try:
                 answer = self.function(t, r, y, state, params)
             except STUDENT_ERRORS as error:
                 return self._failed(error, t, before)
-            ended = time.perf_counter_ns()
-            self.ns.append(ended - started)
-            wall, busy = wall + ended - started, busy + time.thread_time_ns() - cpu
-            self.busy = busy / max(wall, 1)
+            self.ns.append(time.perf_counter_ns() - started)
+            self.work.end()
             if not self._judge_arguments(before, (t, r, y, state), params) or not self._judge_answer(answer, t):
                 return None
             voltage, state, *told = answer

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import time
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -16,7 +15,7 @@ from rds.checks.paths import ARC, CIRCLE, CLOCKWISE, LINE, LINE_BACK, LINE_OF_ON
 from rds.checks.places import changed, outside_sources, remembered
 from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.rows import Trace, alternate, trace
-from rds.checks.timing import judge_time
+from rds.checks.timing import Work, judge_time
 from rds.checks.track import follows_chord, judge_track
 from rds.checks.values import same
 from rds.core.blame import STUDENT_ERRORS, student_error
@@ -68,9 +67,10 @@ class _Check:
             return found.fault(clauses.PARAMS, said)
         self.params = copy.deepcopy(dict(given))
         before = remembered(self.function)
-        cpu, wall = time.thread_time_ns(), time.perf_counter_ns()
+        work = Work()
+        work.begin()
         line, arc = self._trace(LINE), self._trace(ARC)
-        busy = (time.thread_time_ns() - cpu) / max(1, time.perf_counter_ns() - wall)
+        work.end()
         good = [trace for trace in self._kinds(line, arc) if self._judge(trace)]
         if good and not found.faults:
             self._judge_memory(good, before)
@@ -80,7 +80,7 @@ class _Check:
         if good:
             pairs = [(each.ns, self._trace(each.segment).ns) for each in good]
             ns = [min(pair) for first, second in pairs for pair in zip(first, second, strict=False)]
-        self.timing = judge_time(found, "a row of interpolate()", ns, 0, busy, self.T)
+        self.timing = judge_time(found, "a row of interpolate()", ns, 0, work.close(), self.T)
         return None
 
     def _trace(self, segment: Segment) -> Trace:

@@ -14,7 +14,7 @@ from rds.checks.checked_code import CheckedCode, checked_code
 from rds.checks.memory import judge_memory
 from rds.checks.replay import Call
 from rds.checks.report import CheckReport, Findings, Timing
-from rds.checks.timing import judge_time
+from rds.checks.timing import Work, judge_time
 from rds.checks.values import same
 from rds.checks.vectors import is_ragged, output_fault, vector_fault, vector_of
 from rds.core.adapt import as_model, is_control_system
@@ -93,10 +93,11 @@ class _Check:
         self.params = copy.deepcopy(dict(student.params))
         if not self._has_initial_state():
             return None
-        cpu, wall = time.thread_time_ns(), time.perf_counter_ns()
+        work = Work()
+        work.begin()
         with judge_memory(found, f"{self.role}()", self.subject, self.role, clauses.NO_MEMORY, self.budget) as memory:
             self._drive()
-            busy = (time.thread_time_ns() - cpu) / max(1, time.perf_counter_ns() - wall)
+            work.end()
             memory.calls, memory.params = self.calls, self.params
         if not found.faults:
             self._judge_rest()
@@ -104,7 +105,7 @@ class _Check:
                 self._judge_two_steps()
         best = [min(ns, memory.ns.get(k, ns)) for k, ns in enumerate(self.ns)]
         first = min(self.ns[0], memory.first_ns or self.ns[0]) if self.ns else 0
-        self.timing = judge_time(found, f"{self.role}()", best, first, busy, self.T)
+        self.timing = judge_time(found, f"{self.role}()", best, first, work.close(), self.T)
         return None
 
     def _has_initial_state(self) -> bool:

@@ -2,13 +2,41 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 
 from rds.checks import clauses
 from rds.checks.report import Findings, Timing
+from rds.core.thread_time import ThreadTime
 
 COMFORT = 0.5  # of the period: above it, too little is left for input, output and the system
-WORKING = 0.2  # of a call's time: with less work than that it waits, even on a machine that others use
+WORKING = 0.2  # of a call's time: with less work than that it waits
+
+
+class Work:
+    """How much of its time a function works, between each `begin` and `end` in the thread that made this."""
+
+    def __init__(self) -> None:
+        self._account = ThreadTime()
+        self._span = self._worked = 0  # ns
+        self._begun = (0, 0, 0)
+
+    def begin(self) -> None:
+        """The function is called."""
+        self._begun = self._now()
+
+    def end(self) -> None:
+        """It has returned. Time in which others had the processor is not its own."""
+        span, waited, worked = (now - begun for now, begun in zip(self._now(), self._begun, strict=True))
+        self._span, self._worked = self._span + span - waited, self._worked + worked
+
+    def close(self) -> float:
+        """The fraction of its time in which it worked."""
+        self._account.close()
+        return self._worked / max(1, self._span)
+
+    def _now(self) -> tuple[int, int, int]:
+        return time.perf_counter_ns(), self._account.waited(), time.thread_time_ns()
 
 
 def judge_time(
@@ -17,7 +45,7 @@ def judge_time(
     """Note in `found` what the times per call `ns` mean for `sample_period` (s), and sum them up.
 
     `first_ns` is the first call's, where compilation and imports show; `busy` the fraction of its time in which
-    the processor worked on it.
+    it worked.
     """
     if not ns:
         return None
