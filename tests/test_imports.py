@@ -14,6 +14,7 @@ from typing import NamedTuple
 import pytest
 
 import rds
+from rds.core import extras
 
 ROOT = Path(rds.__file__).parent
 
@@ -293,6 +294,19 @@ def test_the_recorder_of_a_run_does_without_numpy() -> None:
 )
 def test_nothing_heavy_is_imported(code: str) -> None:
     assert not set(HEAVY) & loaded(code)
+
+
+def test_what_an_installation_may_lack_is_imported_late() -> None:
+    """At the head of a file it would end commands that do without it, with a traceback."""
+    may = {"numba": "nc/language/fast_lane_", "distributed": "core/parallel/remote.py", "pylti1p3": "grading/lti/"}
+    optional = {module for module, (extra, _) in extras._PACKAGES.items() if extra}
+    for path in ROOT.rglob("*.py"):
+        place = path.relative_to(ROOT).as_posix()
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            names = [each.name for each in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            for package in {name.partition(".")[0] for name in names} & optional:
+                assert place.startswith(("panels/", may.get(package, "panels/"))), f"{place} imports {package}"
 
 
 def test_a_simulation_of_a_student_s_file_imports_nothing_heavy(tmp_path: Path) -> None:

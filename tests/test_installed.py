@@ -247,6 +247,11 @@ def test_a_bare_installation_runs_all_modes_and_reopens_what_it_saved(bare: Path
     compared = run(str(bare), "-m", "rds", "compare", "simulation", "emulation", cwd=alone)
     assert "identical sample for sample" in compared.stdout
     run(str(bare), "-c", OPENED, cwd=alone)
+    (alone / "part.ngc").write_text("G21 G90 G94\nG1 X2 F600\nG2 X3 Y1 I0 J1\nM2\n")
+    for command in (["nc", "run", "part.ngc", "--out", "part"], ["nc", "check", "part.ngc"], ["check", "e.toml"]):
+        done = run(str(bare), "-m", "rds", *command, code=None, cwd=alone)
+        assert "Traceback" not in done.stderr
+    assert (alone / "part" / "result.csv").is_file()
     refused = run(str(bare), "-m", "rds", "fit", "simulation", "--structure", "axis", code=2, cwd=alone)
     assert "a fit needs scipy, which is not installed; install it with: uv pip install --python" in refused.stderr
     assert ".whl[analysis]" in refused.stderr

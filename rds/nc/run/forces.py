@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rds.core.errors import InputError
 from rds.machines import Machine
@@ -167,10 +166,10 @@ def program_forces(prepared: Prepared, machine: Machine, cut: CutFile) -> Progra
 
 def _turned(vectors: np.ndarray, about: np.ndarray, angle: float) -> np.ndarray:
     """Vectors (n, 3) turned about unit vectors (n, 3) by degrees."""
-    if not angle:
-        return vectors
-    made: np.ndarray = Rotation.from_rotvec(np.radians(angle) * about).apply(vectors)
-    return made
+    cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    along = (vectors * about).sum(axis=1, keepdims=True) * about
+    turned: np.ndarray = cosine * vectors + sine * np.cross(about, vectors) + (1.0 - cosine) * along
+    return turned
 
 
 def spindle_speed(program: Program, cut: CutFile) -> np.ndarray:
