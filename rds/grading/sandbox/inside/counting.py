@@ -78,6 +78,7 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
             if since < _AS_A_LINE:
                 return tracing
         elif event == "call" and hides_work(code):
+            frame.f_trace = tracing  # Python 3.13 looks for it here; else this call would not be traced by opcodes
             frame.f_trace_opcodes = True
         events += 1
         since = 0
