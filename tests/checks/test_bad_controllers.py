@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import os
 import random
+import subprocess
+import sys
 import time
 from dataclasses import dataclass
 
@@ -274,6 +277,22 @@ def test_the_broken_clause_is_named(bad, clause, detail):
     assert not report.ok
     assert clause in [fault.clause for fault in report.faults], str(report)
     assert detail in str(report)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no thread is bound to a processor here")
+def test_a_slow_law_that_others_keep_from_the_processor_is_not_told_that_it_waits():
+    processors = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(processors)})  # which those that are started inherit
+    work = "import time\nwhile time.process_time() < 60: pass"  # an end of its own, should this test be killed
+    others = [subprocess.Popen([sys.executable, "-c", work]) for _ in range(8)]
+    try:
+        report = check_controller(slow, initial_state=[0.0], budget=0.5)
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+        os.sched_setaffinity(0, processors)
+    assert "compute less" in str(report)
 
 
 def undeclared_signals(t, r, y, state, params):

@@ -16,6 +16,7 @@ from rds.bus.tools.logs import LogWriter
 from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.identification.logs.describe import describe
+from rds.identification.logs.mat_parts import parts_of
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.tables import read_table
 from rds.results import Result
@@ -98,6 +99,17 @@ def test_vectors_beside_objects_of_matlab_classes_are_read(tmp_path: Path) -> No
         "left out label: of MATLAB's class string",
         "left out tt: of MATLAB's class timetable",
     ]
+
+
+@pytest.mark.parametrize("fields", [("s0", "s1", "s2", "arr"), ("s0", "_TypeSystem", "_Class", "_ObjectMetadata")])
+def test_objects_in_structs_are_told_by_their_class(fields: tuple[str, ...]) -> None:
+    """As scipy gives them, before and from 1.18 on."""
+    from scipy.io.matlab import MatlabOpaque
+
+    table = MatlabOpaque(np.array([("tt", "MCOS", "timetable", None)], dtype=[(name, object) for name in fields]))
+    run = np.empty((1, 1), dtype=[("log", object), ("time", object)])
+    run[0, 0] = table, np.arange(5.0)[:, None]
+    assert [(part.name, part.of_class) for part in parts_of("run", run)] == [("run.log", "timetable"), ("run.time", "")]
 
 
 def test_damaged_mat_files_are_refused(tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+import subprocess
+import sys
 import time
 from typing import Any
 
@@ -11,6 +14,7 @@ import spread_functions
 import rds.core.parallel.process
 from rds.core.parallel.local import place
 from rds.core.parallel.outcome import Failure
+from rds.core.parallel.pipe import FUNCTION, send
 from rds.core.parallel.process import Work, WorkerProcess
 from rds.core.parallel.remote import places
 from rds.core.portable import portable
@@ -52,6 +56,18 @@ def test_a_process_that_was_started_ahead_does_other_work_afterwards() -> None:
         process.end()
         process.close()
     assert first[1:] == (3, 8)
+
+
+def test_a_process_whose_answer_nobody_reads_ends_without_a_word() -> None:
+    command = [sys.executable, "-P", "-m", "rds.core.parallel.worker"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as process:
+        assert process.stdin is not None and process.stdout is not None and process.stderr is not None
+        process.stdout.close()
+        send(process.stdin, pickle.dumps(sys.path))
+        send(process.stdin, FUNCTION + portable(spread_functions.square))
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
 
 
 def test_workers_of_a_cluster_are_counted_by_their_computers() -> None:
