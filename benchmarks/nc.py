@@ -120,8 +120,9 @@ def planning(place: Path, rounds: int) -> list[Figure]:
 def tip_planning(place: Path, rounds: int) -> list[Figure]:
     """The same of a program for the tool's tip on a 5-axis machine: to joints, and to samples within their limits."""
     from rds.machines import load_machine
-    from rds.nc.check import Setup, motion
+    from rds.nc.check import motion
     from rds.nc.cycle_time import cycle_time
+    from rds.nc.setup import Setup
 
     file, machine = write_ball(place / "ball.ngc", TIP_LINES), load_machine("xyzac")
     _ = cycle_time(motion(write_ball(place / "small.ngc", 2000), machine, Setup()), machine)  # compiles

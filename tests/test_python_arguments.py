@@ -11,6 +11,8 @@ import pytest
 
 import rds
 from rds.machines.machine import load_machine as loaded
+from rds.nc import Setup
+from rds.nc.language.dialect import Dialect
 
 LAW = """params = {"Kp": 30.0}
 initial_state = []
@@ -100,3 +102,38 @@ def test_what_is_no_reference_is_refused_with_what_is(given: Any) -> None:
     with pytest.raises(rds.InputError, match=r"reference = .* must be a signal \(rds.sinusoid") as refused:
         rds.Experiment(reference=given, controller="pid")
     assert len(str(refused.value)) < 400
+
+
+@pytest.mark.usefixtures("here")
+def test_a_part_program_is_read_with_a_table() -> None:
+    Path("drill.ngc").write_text("G21 G90\nT4 M6\nG43\nG1 X2 F600\n/X5\nM2\n")
+    Path("tools.tbl").write_text("T4 P1 D6 Z10\n")
+    table = {"tools": "tools.tbl", "block_delete": True}
+    part = rds.PartProgram("drill.ngc", setup=table)
+    same = rds.PartProgram("drill.ngc", setup=Setup(Path("tools.tbl"), options=Dialect(block_delete=True)))
+    assert (part.prepared.path == same.prepared.path).all()
+    assert part.prepared.path["end"][:, 0].max() == 2.0
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"setup": {"tool": "tools.tbl"}}, "there is no 'tool'; .* did you mean 'tools'?"),
+        ({"setup": {"tools": 4}}, "setup: tools = 4 must be the path of a file"),
+        ({"setup": {"block_delete": 1}}, "setup: block_delete = 1 must be true or false"),
+        ({"setup": {"max_jumps": 0}}, "setup: max_jumps = 0 must be a whole number of at least 1"),
+        ({"setup": "tools.tbl"}, "setup = 'tools.tbl' must be a table"),
+        ({"begin": "2"}, "begin = '2' must be a whole number"),
+        ({"begin": -2}, "begin = -2 must be a whole number of at least 0"),
+        ({"steps": 2}, "steps = 2 must be true or false"),
+    ],
+)
+def test_what_a_part_program_is_run_with_is_checked(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(rds.InputError, match=said):
+        rds.PartProgram("part.ngc", **given)
+
+
+def test_a_part_program_is_a_file_and_no_device() -> None:
+    with pytest.raises(rds.InputError, match="/dev/zero: is a pipe or a device"):
+        rds.PartProgram("/dev/zero")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rds.core.figure import Picture
     from rds.interpolators.motion.certificate import Certificate
     from rds.interpolators.motion.samples import SampleBlock
-    from rds.nc.check import Setup
+    from rds.nc.setup import Setup
     from rds.results import Result
 
 MOST = 2_000_000  # samples, which are held in memory

@@ -21,9 +21,9 @@ from rds.core.shared_quantities import SAMPLE_PERIOD
 if TYPE_CHECKING:
     from rds.interpolators.motion.limiting import Explained
     from rds.machines import Machine
-    from rds.nc.check import Setup
     from rds.nc.compensation.proof import Proof
     from rds.nc.cycle_time import CycleTime
+    from rds.nc.setup import Setup
 
 app = typer.Typer(no_args_is_help=True, help="Part programs: check, print, draw, time and make them.")
 nc_make.app.command()(nc_job.job)

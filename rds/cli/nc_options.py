@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from rds.nc.check import Setup
+    from rds.nc.setup import Setup
 
 Program = Annotated[Path, typer.Argument(help="The part program (RS274NGC, as LinuxCNC reads it).", metavar="FILE")]
 MachineName = Annotated[str, typer.Option("--machine", help="A machine's name, or the path of its TOML file.")]
@@ -45,8 +45,8 @@ def setup(
 ) -> Setup:
     """What a program is read with. InputError for an option that there is not."""
     from rds.core.errors import InputError
-    from rds.nc.check import Setup
     from rds.nc.language.dialect import Dialect
+    from rds.nc.setup import Setup
 
     correct = CORRECTION in (options or ())
     given: dict[str, Any] = {}

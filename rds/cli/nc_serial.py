@@ -12,7 +12,7 @@ from rds.cli.common import print_json, progress_bars
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rds.nc.check import Setup
+    from rds.nc.setup import Setup
 
 _MACHINE = "starmill"
 _ALL = ("A", "B", "C", "C-thesis")  # what `all` stands for

@@ -16,7 +16,7 @@ __getattr__, __dir__ = face(
     {
         "Dialect": "language.dialect",
         "ProgramError": "language.errors",
-        "Setup": "check",
+        "Setup": "setup",
         "ToolCentre": "tool_centre",
         "arc": "paths.arcs",
         "canon_text": "language.canon_text:text",

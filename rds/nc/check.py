@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -14,17 +13,14 @@ from rds.core.errors import InputError
 from rds.core.installed import version
 from rds.machines import Machine
 from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_compiled, write_compiled
-from rds.nc.configuration import configured, corrects
+from rds.nc.configuration import configured
 from rds.nc.language.canon import Call, MotionBlock
-from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
-from rds.nc.language.interpreter import interpret
-from rds.nc.language.parameters import read_parameters
 from rds.nc.language.reading_on import Later, faults_never_run
-from rds.nc.language.tools import Tool, read_tools
 from rds.nc.passed_over import Report
 from rds.nc.path_block import PathBlock
-from rds.nc.tool_centre import ToolCentre, has_tool_centre
+from rds.nc.setup import Setup
+from rds.nc.tool_centre import ToolCentre
 from rds.nc.toolpath import raise_it, toolpath
 from rds.nc.validate import Validator
 from rds.nc.validation import Validation
@@ -35,33 +31,6 @@ _MOST_NOTES, _LONGEST_NOTE = 5, 300  # of a program, characters: they stand in t
 _LARGEST_READ_TWICE = 4 << 20  # bytes; larger programs are made by machines, and their subroutines are called
 _LONGEST_NAME = 200  # bytes, of a subroutine that may have a file
 _CALLS = re.compile(rb"(?:o|gr)\s*(?:<\s*([^>\n]+?)\s*>|(\d+))", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class Setup:
-    """What a part program is read with: tool table and parameter file of LinuxCNC's formats, options of the dialect."""
-
-    tools: Path | None = None
-    parameters: Path | None = None
-    options: Dialect = field(default_factory=Dialect)
-    correct: bool = False  # for the assembly errors in the machine's links
-
-    def on(self, machine: Machine, program: Path) -> Setup:
-        """The same for a program on a machine: links with rotary axes read G43.4, and RF03 at its head corrects."""
-        tcp = self.options.tcp or has_tool_centre(machine)
-        return replace(
-            self, options=self.options._replace(tcp=tcp), correct=self.correct or corrects(program, self.options)
-        )
-
-    def tool_list(self) -> list[Tool]:
-        """The tools of the table; none without one. Raises ProgramError for a table that is wrong."""
-        return read_tools(self.tools) if self.tools else []
-
-    def interpret(self, program: Path, remark: Report | None = None) -> Iterator[Item]:
-        """The canonical calls of a program; `remark` gets what is no fault and worth a look. Raises ProgramError."""
-        parameters = read_parameters(self.parameters) if self.parameters else None
-        tools, name = self.tool_list(), str(program)
-        return interpret(program, tools=tools, parameters=parameters, options=self.options, name=name, remark=remark)
 
 
 def motion(

@@ -12,9 +12,10 @@ from rds.core.errors import RdsError
 from rds.machines import load_machine
 from rds.machines.ncc import machine_of_script, read_script, script_of
 from rds.modes.loop.program import Program
-from rds.nc.check import Setup, check_program, motion
+from rds.nc.check import check_program, motion
 from rds.nc.language.dialect import Dialect
 from rds.nc.run.prepare import prepare
+from rds.nc.setup import Setup
 
 NCC = Setup(options=Dialect(ncc=True))
 MILL = load_machine("mrm-mill")

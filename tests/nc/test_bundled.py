@@ -16,8 +16,9 @@ from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.nc.bundled import Bundled, bundled, bundled_paths, find_bundled
-from rds.nc.check import Setup, motion
+from rds.nc.check import motion
 from rds.nc.run.run import PartProgram
+from rds.nc.setup import Setup
 
 PROGRAMS, PATHS = bundled(), bundled_paths()
 

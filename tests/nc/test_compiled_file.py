@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.machines import load_machine
-from rds.nc.check import Setup, check_program, compiled_if_current, sources
+from rds.nc.check import check_program, compiled_if_current, sources
 from rds.nc.compiled_file import MAGIC, open_compiled
 from rds.nc.language.dialect import Dialect
+from rds.nc.setup import Setup
 from rds.nc.toolpath import toolpath
 
 PROGRAM = """G21 G90

@@ -22,10 +22,11 @@ from rds.interpolators.motion.planner import plan
 from rds.machines import load_machine
 from rds.machines.machine import Machine
 from rds.nc import ProgramError, steps
-from rds.nc.check import Setup, check_program, motion
+from rds.nc.check import check_program, motion
 from rds.nc.path_block import PathBlock
 from rds.nc.run.prepare import prepare
 from rds.nc.run.report import certificate_picture
+from rds.nc.setup import Setup
 
 SHIPPED = Path(load_machine("mini-cnc").path)
 

@@ -15,8 +15,9 @@ from rds.cli.main import app
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import plan, predicted_time
 from rds.machines import load_machine
-from rds.nc.check import Setup, motion
+from rds.nc.check import motion
 from rds.nc.language.canon_text import text
+from rds.nc.setup import Setup
 
 PROGRAM = """(lines, arcs in three planes, a helix, a compensated contour)
 G21 G90 G17

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from rds.machines import load_machine
-from rds.nc.check import Setup, check_program
+from rds.nc.check import check_program
+from rds.nc.setup import Setup
 from tests.nc.rs274 import calls, needs_rs274, ours, rs274
 
 MOVES = "G0 Z5\nG0 X0 Y0\nG1 Z-1 F100\nG1 X10 F300\nG2 X10 Y-4 I0 J-2\nG1 X0\nG0 Z5\n"

@@ -18,10 +18,11 @@ from scipy.spatial import cKDTree
 
 from rds.machines import load_machine
 from rds.nc import Dialect, ProgramError, canon_text, interpret
-from rds.nc.check import Setup, check_program
+from rds.nc.check import check_program
 from rds.nc.language.arcs import swept
 from rds.nc.language.canon import ARC, FEED, TRAVERSE, MotionBlock
 from rds.nc.language.turning_contour import CHORD
+from rds.nc.setup import Setup
 from tests.nc.rs274 import needs_rs274, rs274
 
 STEP = 0.02  # mm, of the material's heights

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from rds.core.errors import InputError
 from rds.interpolators.motion.segments import LINE, SEGMENT, arc, chain, point_at
 from rds.machines import load_machine
-from rds.nc.check import Setup, check_program
+from rds.nc.check import check_program
 from rds.nc.extent import extents
 from rds.nc.fault_columns import find_word
+from rds.nc.setup import Setup
 from rds.nc.trace import MOST_POINTS, Trace, sample
 from rds.nc.validate import MOST_FAULTS, tool_limits
 from rds.nc.validation import Validation, plain

@@ -13,11 +13,12 @@ from typer.testing import CliRunner
 from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
-from rds.nc.check import Setup, motion
+from rds.nc.check import motion
 from rds.nc.language.tool_library import ShapedTool, read_library
 from rds.nc.machining.area import area_of, pocket_rings
 from rds.nc.machining.job import read_job
 from rds.nc.paths.region import mended
+from rds.nc.setup import Setup
 from rds.nc.shapes.centre_lines import centre_lines
 from rds.nc.shapes.curves import circle_curve, polyline_curve
 from rds.nc.shapes.files import read_vector_drawing

@@ -13,10 +13,11 @@ from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.nc.axis_plot import plot_axes
-from rds.nc.check import Setup, motion
+from rds.nc.check import motion
 from rds.nc.language.dialect import Dialect
 from rds.nc.run.pictures import along, path
 from rds.nc.run.run import PartProgram
+from rds.nc.setup import Setup
 
 AXIS = """
 [axis.{name}]

@@ -17,12 +17,13 @@ from rds.interpolators.motion.segments import AXES, JOINTS
 from rds.machines import Machine, load_machine
 from rds.machines.kinematics.tip import Tip
 from rds.nc.active import Modes
-from rds.nc.check import Setup, check_program, motion
+from rds.nc.check import check_program, motion
 from rds.nc.cycle_time import cycle_time
 from rds.nc.language.dialect import Dialect
 from rds.nc.run.contour import contour_error
 from rds.nc.run.prepare import Prepared, prepare
 from rds.nc.run.run import PartProgram, ProgramRun, Status
+from rds.nc.setup import Setup
 from rds.nc.tool_centre import ToolCentre, without_errors
 from rds.panels.program.status import status_html
 

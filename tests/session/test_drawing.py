@@ -105,7 +105,8 @@ def test_cells_that_are_none_are_refused(tmp_path: Path, cells: str) -> None:
 
 def test_the_program_is_written_opened_and_valid(tmp_path: Path) -> None:
     from rds.machines import load_machine
-    from rds.nc.check import Setup, check_program
+    from rds.nc.check import check_program
+    from rds.nc.setup import Setup
 
     made = drawing(tmp_path, cells=BLOCK)
     assert made.write() == "drawing.ngc"

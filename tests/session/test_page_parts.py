@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from rds.core.errors import ContractError, InputError
-from rds.nc.check import Setup
+from rds.nc.setup import Setup
 from rds.panels.equipment.build import Checked, Mark
 from rds.panels.equipment.preview import preview
 from rds.panels.equipment.result_actions import ResultActions

@@ -110,7 +110,7 @@ def test_a_name_that_leads_elsewhere_is_refused(tmp_path: Path, name: str) -> No
 @given(st.text(max_size=200))
 def test_any_text_is_looked_at_without_an_error(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
     from rds.machines import load_machine
-    from rds.nc.check import Setup
+    from rds.nc.setup import Setup
     from rds.panels.program.check import look
     from rds.panels.session.task import Task
 

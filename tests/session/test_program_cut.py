@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.nc.check import Setup
 from rds.nc.run.run import PartProgram
+from rds.nc.setup import Setup
 from rds.nc.stepping import Step
 from rds.panels.program.cut_html import cut_html
 from rds.panels.program.state import Program

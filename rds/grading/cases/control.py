@@ -247,8 +247,9 @@ def _program(words: TomlTable, folder: Path, machine: Machine) -> tuple[Prepared
     name = inside(words, "program", folder)
     if name is None:
         return None, ()
-    from rds.nc.check import Setup, motion  # most assignments have no part program, and these take long to import
+    from rds.nc.check import motion  # most assignments have no part program, and these take long to import
     from rds.nc.run.prepare import planned
+    from rds.nc.setup import Setup
 
     T = words.read("sample_period", machine.sample_period)
     # planned from the text: a compiled form beside it would be written into the assignment

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 CHUNK = 1 << 18  # bytes read at once
 LONGEST = 252  # characters of a line, as in LinuxCNC
+NOT_A_FILE = "is a pipe or a device, and a program is read more than once; give a file"
 _WINDOW = LONGEST + 4  # a block with `;` and a line break, and one character more
 
 
@@ -237,7 +238,14 @@ def open_source(source: str | Path | IO[Any] | Source, name: str = "", *, semico
     return Source(stream, name or str(getattr(source, "name", "")), semicolons=semicolons, owned=owned)
 
 
+def not_a_file(path: str | Path) -> bool:
+    """Whether the path is a pipe's or a device's: a program is read more than once, and /dev/zero has no end."""
+    return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
+
+
 def open_file(path: str | Path, name: str, *, semicolons: bool = False) -> Source:
+    if not_a_file(path):
+        raise ProgramError(NOT_A_FILE, file=name)
     try:
         stream = open(path, "rb")  # noqa: SIM115 (closed by close)
     except OSError as error:

@@ -32,12 +32,13 @@ from rds.interpolators.segment_rows import SEGMENTS, read_segments, segments_of
 from rds.machines import Machine
 from rds.modes.loop.interpolated import LEAST_AHEAD
 from rds.modes.loop.program import InterpolatedProgram, Program, ProgramEvent, Row, Stretch, dwell_samples
-from rds.nc.check import Setup, motion
+from rds.nc.check import motion
 from rds.nc.interpolator_segments import program as moves_of
 from rds.nc.path_block import PathBlock
 from rds.nc.run.judge import judged
 from rds.nc.run.path_segments import check_room, in_machine_axes, without_idle
 from rds.nc.run.prepare import Prepared, planned, prepare
+from rds.nc.setup import Setup
 from rds.results import Result
 
 SUFFIX = ".toml"  # of a path file; any other is a part program

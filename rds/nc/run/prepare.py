@@ -21,11 +21,12 @@ from rds.interpolators.motion.segments import AXES, JOINTS, SEGMENT
 from rds.machines import Machine
 from rds.machines.kinematics.tip import Tip
 from rds.modes.loop.program import InterpolatedProgram, Program, ProgramEvent
-from rds.nc.check import Setup, check_program, compiled_if_current
+from rds.nc.check import check_program, compiled_if_current
 from rds.nc.compiled_file import Compiled, open_compiled
 from rds.nc.configuration import configured
 from rds.nc.path_block import Event, PathBlock
 from rds.nc.run.in_part import from_line, stepwise
+from rds.nc.setup import Setup
 from rds.nc.tool_centre import ToolCentre, path_of_tip
 
 SPINDLE_UNIT = "rev/min"

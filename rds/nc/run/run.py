@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import ceil, hypot
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.quantities import Flag, Quantity, checked
 from rds.core.toml_table import TomlTable
 from rds.interpolators.motion.segments import AXES, JOINTS
 from rds.machines import Machine, load_machine
@@ -25,15 +26,16 @@ from rds.modes.loop.plan import Plan
 from rds.modes.loop.program import HOLD, HOME, OVERRIDE, RESUME, Program
 from rds.modes.process.host import Progress
 from rds.modes.process.live import Live
-from rds.nc.check import Setup
 from rds.nc.run.forces import program_forces
 from rds.nc.run.judge import judged
 from rds.nc.run.path import WORDS, as_prepared, method_of, of_part_program
 from rds.nc.run.prepare import SPINDLE_UNIT, Prepared, prepare
+from rds.nc.setup import Setup
 from rds.results import Result
 
 AXES_CONTROLLER = {"name": "tracking"}
 SPINDLE_CONTROLLER = {"name": "pid"}
+_BEGIN = Quantity("line of the program to begin at; 0: at its head", low=0, whole=True)
 _AHEAD = 1e-3  # s, over which the rate of the tip is taken
 
 
@@ -138,9 +140,10 @@ class ProgramRun(Run):
 class PartProgram(Experiment):
     """A part program on the axes of a machine, the spindle included.
 
-    `file` is the program; `machine` its name or file; `setup` what the program is read with (tool table, parameters,
-    options of the dialect). Each position axis follows under `controller` (default: tracking), the spindle under PID; a
-    table of an experiment file (`experiment`) says more: controllers and models of single axes, interface, timing, bus.
+    `file` is the program; `machine` its name or file; `setup` what the program is read with, a table of the files
+    `tools` and `parameters`, of `correct` and of the dialect's options (`rds.nc.Setup`). Each position axis follows
+    under `controller` (default: tracking), the spindle under PID; a table of an experiment file (`experiment`) says
+    more: controllers and models of single axes, interface, timing, bus.
 
     With `interpolator` (a name of the library, the path of a student's .py file, a function, or a table with
     `interpolator`, `params` and `look_ahead`) its moves are not planned: the interpolator makes the samples inside the
@@ -168,7 +171,7 @@ class PartProgram(Experiment):
         file: str | Path,
         machine: str | Path | None = None,
         *,
-        setup: Setup | None = None,
+        setup: Setup | Mapping[str, Any] | None = None,
         controller: Any = None,
         interpolator: Any = None,
         acceleration: Any = None,
@@ -184,6 +187,7 @@ class PartProgram(Experiment):
     ):
         words = TomlTable({}, EXPERIMENT) if experiment is None else TomlTable.open(experiment, EXPERIMENT)
         machine = str(machine) if isinstance(machine, Path) else machine
+        read_with = Setup.of(setup)
         given = {"machine": machine, "mode": mode, "sample_period": sample_period, "controller": controller}
         for key, value in given.items():
             if value is not None and key in words.table and key not in ("mode", "controller"):
@@ -195,6 +199,9 @@ class PartProgram(Experiment):
         self._table = table
         self._words = words.over_written(_with_spindle(table, self._machine))
         T = self._words.read("sample_period", self._machine.sample_period)
+        checked(_BEGIN, begin, "begin")
+        for key, flag in (("exact_stop", exact_stop), ("steps", steps)):
+            checked(Flag(""), flag, key)
         if interpolator is None:
             for key, value in (("acceleration", acceleration), ("exact_stop", exact_stop)):
                 if value:
@@ -207,13 +214,13 @@ class PartProgram(Experiment):
         def prepared(machine: Machine) -> Prepared:
             if interpolator is None:
                 how = "point-to-point" if steps and profile == "planned" else profile
-                made = prepare(Path(file), machine, setup, T, progress, how, begin=begin, steps=steps)
+                made = prepare(Path(file), machine, read_with, T, progress, how, begin=begin, steps=steps)
             else:
                 words = {"interpolator": interpolator} if not isinstance(interpolator, dict) else dict(interpolator)
                 words |= {} if acceleration is None else {"acceleration": acceleration}
                 words |= {"exact_stop": True} if exact_stop else {}
                 method = method_of(TomlTable(words, WORDS), Path.cwd())
-                made = as_prepared(of_part_program(Path(file), machine, setup, T, method, progress), Path(file), T)
+                made = as_prepared(of_part_program(Path(file), machine, read_with, T, method, progress), Path(file), T)
             return made if cut is None else _guarded(made, machine, cut)
 
         self._prepare = prepared

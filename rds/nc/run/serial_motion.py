@@ -25,8 +25,8 @@ from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.segments import AXES, LINE, in_plane
 from rds.machines import Machine
 from rds.modes.loop.program import Program, dwell_samples
-from rds.nc.check import Setup
 from rds.nc.run.prepare import Prepared, Progress, prepare
+from rds.nc.setup import Setup
 
 MOTIONS = ("plan", "constant")
 _MOST_STEPS = 65_535  # of a segment in method B

@@ -246,8 +246,9 @@ def stoppable(interpolator: Interpolator, task: Task[Any]) -> Interpolator:
 
 def read_program(path: Path, machine: str, T: float) -> tuple[list[Segment], dict[int, float], list[str]]:
     """A part program's segments, rests and notes. ProgramError at its first fault, with line and word."""
-    from rds.nc.check import Setup, motion
+    from rds.nc.check import motion
     from rds.nc.interpolator_segments import MOST, program
+    from rds.nc.setup import Setup
 
     loaded = load_machine(machine)
     found = program(motion(path, loaded, Setup()), loaded, T, MOST)

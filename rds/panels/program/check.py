@@ -10,13 +10,14 @@ from typing import Any
 from rds.core.errors import RdsError
 from rds.machines import Machine
 from rds.nc.active import Follower, Modes
-from rds.nc.check import Setup, validator_of, watched
+from rds.nc.check import validator_of, watched
 from rds.nc.cycle_time import CycleTime, cycle_time
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.parameters import read_parameters
 from rds.nc.language.reading_on import Later
 from rds.nc.path_block import PathBlock
 from rds.nc.run.prepare import least_seconds, require_room
+from rds.nc.setup import Setup
 from rds.nc.tool_centre import shown
 from rds.nc.trace import Trace
 from rds.nc.validation import Validation

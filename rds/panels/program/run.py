@@ -14,9 +14,9 @@ from rds.core.errors import ContractError, InputError, RdsError
 from rds.modes.experiment.experiment import FailedRun
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import SINGLE_STEP
-from rds.nc.check import Setup
 from rds.nc.run.report import save_run
 from rds.nc.run.run import PartProgram, ProgramRun, Status
+from rds.nc.setup import Setup
 from rds.panels.equipment.run import STRIP_RATE, EquipmentRun, contour_errors, raise_stopped, recorded
 from rds.panels.program.stock import Cut
 from rds.panels.session.saving import saving

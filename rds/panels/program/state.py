@@ -22,7 +22,7 @@ from rds.panels.session.session import Session
 from rds.panels.session.task import Task
 
 if TYPE_CHECKING:
-    from rds.nc.check import Setup
+    from rds.nc.setup import Setup
     from rds.panels.program.check import Look
     from rds.panels.program.run import ProgramWork
 
@@ -253,8 +253,8 @@ class Program:
 
     def setup(self) -> Setup:
         """What the program is read with."""
-        from rds.nc.check import Setup
         from rds.nc.language.dialect import Dialect
+        from rds.nc.setup import Setup
 
         folder = self.session.folder
         tools, parameters = (folder / name if name else None for name in map(self._named, ("tools", "parameters")))
