@@ -381,6 +381,13 @@ def test_a_frame_whose_length_is_not_that_of_its_data_is_not_sent(bitrate: int |
     assert message is not None and (message.arbitration_id, message.dlc) == (2, 3)
 
 
+def test_a_bus_that_is_shut_down_refuses_periodic_frames_to_its_caller(open_bus: Opener) -> None:
+    bus = open_bus()
+    bus.shutdown()
+    with pytest.raises(can.CanOperationError, match="this bus has been shut down"):
+        bus.send_periodic(can.Message(arbitration_id=7, is_extended_id=False), 0.01)
+
+
 def test_a_bus_that_is_shut_down_ends_fast_periodic_sending_quietly(
     open_bus: Opener, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -329,6 +329,11 @@ class BuiltinBus(can.BusABC):
                 self._early.append(record)
         return ""
 
+    def _send_periodic_internal(self, *args: Any, **options: Any) -> Any:
+        """As python-can's. Raises can.CanOperationError at once if the bus is gone, not in the thread that sends."""
+        self._require_hub()
+        return super()._send_periodic_internal(*args, **options)
+
     def shutdown(self) -> None:
         """Leave the bus. May be called more than once. Frames sent before still reach the others."""
         if self._is_shutdown:
