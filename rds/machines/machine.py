@@ -35,12 +35,13 @@ DEFAULT_FEED = Quantity(
 )
 RESOLUTION = Quantity("of the encoder", "axis unit per count", above=0.0)
 PARAMETER = Quantity("parameter of the model")
+_SLOWEST, _FASTEST = 1e-9, 1e12  # what the planner can still divide by
 LIMITS = Table(
     "what planned motion keeps to; an axis without limits takes part in no part program",
     {
-        "velocity": Quantity("largest velocity", "axis unit/s", above=0.0),
-        "acceleration": Quantity("largest acceleration", "axis unit/s²", above=0.0),
-        "jerk": Quantity("largest jerk", "axis unit/s³", above=0.0),
+        "velocity": Quantity("largest velocity", "axis unit/s", low=_SLOWEST, high=_FASTEST),
+        "acceleration": Quantity("largest acceleration", "axis unit/s²", low=_SLOWEST, high=_FASTEST),
+        "jerk": Quantity("largest jerk", "axis unit/s³", low=_SLOWEST, high=_FASTEST),
     },
     needed=("velocity", "acceleration", "jerk"),
 )

@@ -51,7 +51,8 @@ def test_limits_that_cannot_be_are_refused(tmp_path: Path) -> None:
     for table, message in {
         "": "axis X has no limits",
         "[axis.X.limits]\nvelocity = 1.0\nacceleration = 1.0": "jerk is missing; give it in axis unit/s³",
-        "[axis.X.limits]\nvelocity = 1.0\nacceleration = -1.0\njerk = 1.0": "acceleration = -1.0 must be more than 0",
+        "[axis.X.limits]\nvelocity = 1.0\nacceleration = -1.0\njerk = 1.0": "acceleration = -1.0 must be from 1e-09",
+        "[axis.X.limits]\nvelocity = 1e-300\nacceleration = 1.0\njerk = 1.0": "velocity = 1e-300 must be from 1e-09",
         "[axis.X.limits]\nspeed = 1.0": "velocity is missing",
     }.items():
         (tmp_path / "m.toml").write_text(text + table)
