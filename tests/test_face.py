@@ -6,6 +6,7 @@ import ast
 import inspect
 import json
 from importlib import import_module
+from pathlib import Path
 
 import control
 import numpy as np
@@ -112,3 +113,42 @@ class TestAModelAlone:
     def test_what_is_refused(self, arguments: dict[str, object], said: str) -> None:
         with pytest.raises(rds.InputError, match=said):
             rds.lsim("linear-axis", **arguments)
+
+
+def test_what_a_notebook_shows_of_each_thing_is_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("part.ngc").write_text("G21 G90\nG1 X2 Y1 F600\nM2\n")
+    experiment = rds.Experiment(signal=rds.chirp(3.0, 0.5, 5.0, 2.0), duration=2.0)
+    experiment.run(out="run")
+    (log,) = rds.read_log("run")
+    estimate = rds.fit(log, "axis")
+    rds.write_model("fitted.toml", estimate)
+    loop = rds.Experiment(axis=["X", "Y"], reference=rds.sinusoid(1.0, 2.0), controller="pid", duration=0.5)
+    study = rds.robustness(loop, 4, ranges={axis: {"tau": (0.009, 0.011)} for axis in "XY"})
+    machine = rds.load_machine("mini-cnc")
+    design, file = rds.design("fitted.toml"), rds.read_model("fitted.toml")
+    shown = {
+        repr(machine): "<Machine mini-cnc: X in mm, Y in mm, Z in mm, spindle in rev/min; 0.001 s>",
+        repr(machine.kinematics): "<Kinematics mini-cnc: X -75 to 75 mm, Y -75 to 75 mm, Z -50 to 50 mm>",
+        repr(experiment): "<Experiment: simulation of X on mini-cnc, 2 s>",
+        repr(loop): "<Experiment: simulation of X, Y on mini-cnc, 0.5 s>",
+        repr(rds.PartProgram("part.ngc")): "<PartProgram part.ngc on mini-cnc: X, Y",
+        repr(rds.sinusoid(1.0, 2.0)): "<Signal sinusoid: amplitude = 1, frequency = 2, offset = 0, phase = 0>",
+        repr(rds.library_model("linear-axis", tau=TAU, K=K)): "<Model linear-axis: friction_plus = 0, ",
+        repr(design): "<Controller tracking: g1 = 1600, ",
+        repr(log): "<Log run: 2000 samples in 1.999 s, command in V, position in mm",
+        repr(rds.structure("axis")): "<Structure axis: tau, K, friction_plus, friction_minus>",
+        repr(estimate): "<Estimate of axis by simulation: tau = 0.0099",
+        repr(file): "<ModelFile fitted.toml of axis: tau = 0.0099",
+        repr(rds.frequency_response(log)): "<FrequencyResponse: ",
+        repr(rds.interpolate(rds.LineSegment((0.0, 0.0), (2.0, 0.0), 10.0), 1e-3, "linear")): "<Interpolation of 1 ",
+        repr(rds.interpolator("tustin")): "<Interpolator tustin: blu = 0.01, steps = 0>",
+        repr(rds.learn(loop, 2)): "<Learned in 2 trials: RMS of the tracking error of X from ",
+        repr(study): "<Study of X, Y: 4 runs of 0.5 s, seed 0, 0 unstable, 0 not run>",
+    }
+    for text, expected in shown.items():
+        assert text.startswith(expected) and len(text) < 250 and "0x" not in text and "\n" not in text
+    assert "  tau = 0.0099" in str(estimate) and "free run: fit 9" in str(estimate)
+    assert "rank correlation" in study._repr_html_()
+    (tmp_path / "law.py").write_text("def control(t, r, y, state, params):\n    return 0.0, state\n")
+    assert repr(rds.check_file("law.py")).startswith("law.py: the controller keeps its interface")

@@ -79,6 +79,8 @@ class CheckReport:
             lines.append(f"  time: {self.timing}")
         return "\n".join(lines)
 
+    __repr__ = __str__  # what a notebook shows
+
 
 @dataclass(frozen=True)
 class FileReport:
@@ -113,6 +115,8 @@ class FileReport:
 
     def __str__(self) -> str:
         return "\n".join([*map(str, self.reports), *(f"warning: {warning}" for warning in self.warnings)])
+
+    __repr__ = __str__  # what a notebook shows
 
 
 class Findings:

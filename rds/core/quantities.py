@@ -60,6 +60,12 @@ def shortened(value: Any, longest: int = 200) -> str:
         return "a number of thousands of digits"
 
 
+def listed(values: Mapping[str, Any], most: int = 8) -> str:
+    """Names and values in one line, as in `tau = 0.01, K = 1.76`; "…" stands for those after `most`."""
+    said = [f"{name} = {f'{v:.6g}' if isinstance(v, float) else shortened(v, 40)}" for name, v in values.items()]
+    return ", ".join(said[:most] + ["…"] * (len(said) > most))
+
+
 def near(word: Any, known: Sequence[str]) -> str:
     """The hint at the known word that is nearest to `word`; empty if none is near."""
     close = get_close_matches(str(word), known, n=1)

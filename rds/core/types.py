@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from rds.core.quantities import Quantity
+from rds.core.quantities import Quantity, listed
 
 
 class Reference(NamedTuple):
@@ -95,6 +95,9 @@ class Controller:
     observe: Callable[..., Sequence[float]] | None = None
     repeatable: bool = True
 
+    def __repr__(self) -> str:
+        return _named(self)
+
 
 @dataclass(frozen=True)
 class Model:
@@ -117,6 +120,14 @@ class Model:
     fitted: Source | None = None
     has_velocity: bool = False
     told: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return _named(self)
+
+
+def _named(part: Controller | Model) -> str:
+    said = listed(part.params)
+    return f"<{type(part).__name__} {part.source.name}{': ' if said else ''}{said}>"
 
 
 class Ending(StrEnum):

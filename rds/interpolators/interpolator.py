@@ -16,7 +16,7 @@ from rds.core.errors import ContractError, InputError
 from rds.core.geometry import length
 from rds.core.load import StudentFile, from_function, load_student
 from rds.core.options import read_options
-from rds.core.quantities import shortened
+from rds.core.quantities import listed, shortened
 from rds.core.signature import form
 from rds.core.types import ArcSegment, Segment, Source
 from rds.interpolators import DEFAULT, LIBRARY
@@ -45,6 +45,10 @@ class Interpolator:
     blu: float | None = None
     theory: Callable[[Segment, float, Mapping[str, Any]], Any] | None = None
     word: Method | None = None
+
+    def __repr__(self) -> str:
+        said = listed(self.params)
+        return f"<Interpolator {self.name}{': ' if said else ''}{said}>"
 
     def interpolate(self, segment: Segment, T: float) -> Rows:
         """Its rows (mm, mm/s, mm/s²) every `T` s."""

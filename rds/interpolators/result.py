@@ -45,6 +45,11 @@ class Interpolation:
     theory: np.ndarray
     pulses: np.ndarray | None
 
+    def __repr__(self) -> str:
+        by = " and ".join(dict.fromkeys(self.methods))
+        of = f"{len(self.segments)} {'segment' if len(self.segments) == 1 else 'segments'}"
+        return f"<Interpolation of {of} by {by}: {', '.join(self.axes)}, {self.samples} samples of {self.T:g} s>"
+
     @property
     def samples(self) -> int:
         """N."""

@@ -173,6 +173,10 @@ class Machine:
     digital: tuple[str, ...] = ()
     analog: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        axes = ", ".join(f"{axis.name} in {axis.unit}" for axis in self.axes.values())
+        return f"<Machine {self.name}: {axes}; {self.sample_period:g} s>"
+
     @cached_property
     def kinematics(self) -> Kinematics:
         """How its joints move the tool relative to the work; of a machine without links the identity.

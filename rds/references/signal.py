@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.quantities import listed
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.core.types import Reference
 
@@ -29,6 +30,9 @@ class Signal:
     settings: Mapping[str, Any] = field(default_factory=dict)
     voltage: Callable[[np.ndarray], np.ndarray] | None = None
     fastest: float | None = None  # Hz, the highest frequency in it, where that is not 1/`period`
+
+    def __repr__(self) -> str:
+        return f"<Signal {self.kind}: {listed(self.settings)}>"
 
     def value(self, t: Any) -> Any:
         """The voltage at time `t` (s): an array for an array of times, a float for one."""

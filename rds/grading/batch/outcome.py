@@ -21,6 +21,10 @@ class BatchOutcome:
     seconds: float
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{many} {status.value}" for status, many in self.counts().items()) or "no submission"
+        return f"<BatchOutcome: {counts}; in {self.folder}>"
+
     @property
     def submissions_per_second(self) -> float:
         """Graded in this run of the program; 0 if there was nothing left to do."""

@@ -41,6 +41,11 @@ def guesses(parameters: Mapping[str, Parameter]) -> list[str]:
     return [name for name, parameter in parameters.items() if not parameter.told]
 
 
+def in_a_line(parameters: Mapping[str, Parameter]) -> str:
+    """The values with their units."""
+    return ", ".join(f"{name} = {p.value:.6g} {p.unit}".rstrip() for name, p in parameters.items())
+
+
 def said_of_guesses(parameters: Mapping[str, Parameter]) -> list[str]:
     """A sentence that names the parameters whose values are guesses; none where the data tell all of them."""
     said = [f"{name} = {parameters[name].value:.3g} {parameters[name].unit}".rstrip() for name in guesses(parameters)]
@@ -100,6 +105,14 @@ class Estimate:
         from rds.identification.fit.estimate_json import to_json
 
         return to_json(self)
+
+    def __repr__(self) -> str:
+        return f"<Estimate of {self.structure} by {self.method}: {in_a_line(self.parameters)}>"
+
+    def __str__(self) -> str:
+        from rds.identification.fit.estimate_json import as_text
+
+        return as_text(self)
 
     def _repr_html_(self) -> str:
         from rds.identification.fit.fit_report import fragment

@@ -95,6 +95,16 @@ def error_rows(estimate: Estimate) -> tuple[list[str], Rows]:
     return ["log", "prediction", "fit %", "RMSE", "max", "unit"], rows
 
 
+def as_text(estimate: Estimate) -> str:
+    """Parameters, errors and doubts, a line each, as a print of the estimate shows them."""
+    lines = [f"{described(estimate)} by {estimate.method}"]
+    for name, value, _, interval, unit in parameter_rows(estimate)[1]:
+        lines.append(f"  {name} = {' '.join(filter(None, (value, unit)))} ({interval})")
+    for log, what, fit, rmse, most, unit in error_rows(estimate)[1]:
+        lines.append(f"  {log}, {what}: fit {fit} %, RMSE {rmse} {unit}, at most {most} {unit}")
+    return "\n".join([*lines, *(f"  to doubt: {doubt}" for doubt in (*estimate.unidentifiable, *estimate.warnings))])
+
+
 def described(estimate: Estimate) -> str:
     """The structure with its options."""
     name = Path(estimate.structure).name

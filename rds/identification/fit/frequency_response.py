@@ -42,6 +42,11 @@ class FrequencyResponse:
     averages: float  # periods, or windows (overlapping ones count as fewer)
     period: float | None  # s; None: by Welch's method
 
+    def __repr__(self) -> str:
+        how = f"averaged over {self.averages:.3g} periods" if self.period is not None else "by Welch's method"
+        span = f"{self.frequency[0]:.3g} to {self.frequency[-1]:.3g} Hz" if len(self.frequency) else "none"
+        return f"<FrequencyResponse: {len(self.frequency)} lines, {span}, {how}>"
+
     @property
     def magnitude_band(self) -> tuple[np.ndarray, np.ndarray]:
         """95 % band of the magnitude, to first order."""
@@ -67,8 +72,10 @@ def output_rate(log: Log, is_rate: bool) -> tuple[np.ndarray, np.ndarray]:
     return log.command[:-1], np.diff(log.position) / log.sample_period
 
 
-def frequency_response(log: Log, is_rate: bool, period: float | None = None) -> FrequencyResponse:
+def frequency_response(log: Log, is_rate: bool | None = None, period: float | None = None) -> FrequencyResponse:
     """The response of the log's output to its command; `period` (s) if it is known that the command repeats.
+
+    `is_rate` says whether the output is a speed; None: as the log says.
 
     InputError for a command that excites no frequency, or irregular times.
     """
@@ -81,7 +88,7 @@ def frequency_response(log: Log, is_rate: bool, period: float | None = None) -> 
             "frequency response needs; take --method simulation, or resample the log",
             log.source or log.name,
         )
-    u, y = output_rate(log, is_rate)
+    u, y = output_rate(log, log.is_rate if is_rate is None else is_rate)
     if not np.ptp(u) > 0.0:
         raise InputError(f"the command is {u[0]:g} throughout: it excites no frequency", log.name)
     if not np.ptp(y) > 0.0:

@@ -27,7 +27,7 @@ from rds.core.installed import version
 from rds.core.quantities import AnyValue, Declaration, Items, Quantity, Table, Tables, Text
 from rds.core.toml_table import TomlTable
 from rds.core.toml_text import toml_text
-from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
+from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, in_a_line, said_of_guesses
 from rds.identification.structures.signals import VOLTS
 from rds.identification.structures.structures import LIBRARY
 
@@ -61,6 +61,9 @@ class ModelFile:
     text: str = ""
     output_unit: str = "mm"  # of what it answers
     command_unit: str = "V"
+
+    def __repr__(self) -> str:
+        return f"<ModelFile {Path(self.path).name} of {self.structure}: {in_a_line(self.parameters)}>"
 
     @property
     def is_student(self) -> bool:

@@ -95,6 +95,12 @@ class Log:
     def __len__(self) -> int:
         return len(self.time)
 
+    def __repr__(self) -> str:
+        of = {"command": "V", "position": "mm"} | dict.fromkeys(self.extra, "") | dict(self.units)
+        units = [f"{name}{f' in {of[name]}' if of[name] else ''}" for name in ("command", "position", *self.extra)]
+        seconds = float(self.time[-1] - self.time[0])
+        return f"<Log {self.name}: {len(self)} samples in {seconds:.6g} s, {', '.join(units)}>"
+
     @property
     def sample_period(self) -> float:
         """The mean step of the time, s."""

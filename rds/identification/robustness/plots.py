@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from rds.core.figure import BLUE, GREY, VERMILLION, Picture, dress, legend
 from rds.identification.robustness.figures import FIGURES
-from rds.identification.robustness.study import Study
+
+if TYPE_CHECKING:
+    from rds.identification.robustness.study import Study
 
 _SHOWN = ("max_error", "rms_error", "gain_margin", "phase_margin")
 _DOTS = 4000  # as many as the eye tells apart

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from base64 import b64encode
+from collections.abc import Mapping
 from functools import partial
 from html import escape
 from io import StringIO
 from pathlib import Path
-from typing import BinaryIO
+from types import MappingProxyType
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
 from rds.core.atomic import write_files
 from rds.identification.robustness.figures import FIGURES
 from rds.identification.robustness.plots import dependence, distributions
-from rds.identification.robustness.study import Study
 from rds.identification.robustness.summary import PERCENTS, AxisSummary, sentences, summaries
 from rds.results import html
 from rds.results.report import page
 from rds.results.units import heading
+
+if TYPE_CHECKING:
+    from rds.identification.robustness.study import Study
 
 COLUMNS = ("figure", "estimate", *(f"{p} %" for p in PERCENTS), "worst", "unit")
 
@@ -77,10 +81,13 @@ def study_page(study: Study, title: str, pictures: dict[str, bytes]) -> str:
     """The page as HTML that fetches nothing, with the `pictures` (PNG) of each axis."""
     runs = len(study.figures)
     drawn = f"{runs} runs of {study.task.plan.samples * study.task.plan.T:g} s, seed {study.task.seed}"
-    parts = [
-        f'<header><h1>{escape(title)}</h1><p class="about">{escape(drawn)}</p>'
-        f"{html.notes_list([*sentences(study), *study.notes])}</header>"
-    ]
+    header = f'<header><h1>{escape(title)}</h1><p class="about">{escape(drawn)}</p></header>'
+    return page(title, header + fragment(study, pictures))
+
+
+def fragment(study: Study, pictures: Mapping[str, bytes] = MappingProxyType({})) -> str:
+    """What was found as HTML without a page around it, for a notebook or the page; all text is escaped."""
+    parts = [html.notes_list([*sentences(study), *study.notes])]
     for found in summaries(study):
         images = "".join(
             f'<img alt="{escape(name)}" src="data:image/png;base64,{b64encode(picture).decode("ascii")}">'
@@ -91,7 +98,7 @@ def study_page(study: Study, title: str, pictures: dict[str, bytes]) -> str:
             f"<section><h2>Axis {escape(found.axis)}</h2>{html.table(COLUMNS, figure_rows(found), note=FIGURES_NOTE)}"
             f"{html.table(PARAMETER_COLUMNS, parameter_rows(found), note=PARAMETER_NOTE)}{images}</section>"
         )
-    return page(title, "\n".join(parts))
+    return "\n".join(parts)
 
 
 def draws_table(study: Study) -> str:

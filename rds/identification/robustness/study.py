@@ -43,6 +43,17 @@ class Study:
     notes: tuple[str, ...]
     seconds: float
 
+    def __repr__(self) -> str:
+        unstable = sum(int(self.unstable(number).sum()) for number in range(len(self.axes)))
+        seconds = self.task.plan.samples * self.task.plan.T
+        runs = f"{len(self.figures)} runs of {seconds:g} s, seed {self.task.seed}"
+        return f"<Study of {', '.join(self.axes)}: {runs}, {unstable} unstable, {len(self.reasons)} not run>"
+
+    def _repr_html_(self) -> str:
+        from rds.identification.robustness.report import fragment
+
+        return fragment(self)
+
     @property
     def axes(self) -> list[str]:
         """The axes' names."""

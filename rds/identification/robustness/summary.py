@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rds.core.extras import needed_for
 from rds.identification.robustness.figures import FIGURES
-from rds.identification.robustness.study import Study
+
+if TYPE_CHECKING:
+    from rds.identification.robustness.study import Study
 
 PERCENTS = (5, 50, 95, 99)
 

@@ -79,6 +79,11 @@ class Structure:
     command_unit: str = "V"
     # parameters that only make sense held at a value unless another is held, with the sentence that says so
     held: Callable[[frozenset[str]], Mapping[str, tuple[float, str]]] | None = None
+
+    def __repr__(self) -> str:
+        options = f" with {', '.join(self.options)}" if self.options else ""
+        return f"<Structure {self.name}{options}: {', '.join(self.parameters)}>"
+
     # parameters that the logs state and no fit can tell (a force per volt), held at these values, with 0 std error
     given: Callable[[Sequence[Log]], Mapping[str, float]] | None = None
     default_method: str = SIMULATION_ERROR  # the method where the user names none

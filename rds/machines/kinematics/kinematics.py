@@ -38,6 +38,11 @@ class Kinematics:
     chain: Chain  # from the work's zero to the tool's tip
     bodies: dict[str, Chain]  # from the bed to each link's frame, to the tool's tip and to the work's zero
 
+    def __repr__(self) -> str:
+        joints = zip(self.joints, self.turns, self.travel, strict=True)
+        said = [f"{name} {low:g} to {high:g} {'deg' if turns else 'mm'}" for name, turns, (low, high) in joints]
+        return f"<Kinematics {self.name}: {', '.join(said)}>"
+
     def values(self, joints: Joints) -> np.ndarray:
         """Joint values as an array (n, joints); those that a mapping does not name are 0. InputError for others."""
         if isinstance(joints, Mapping):

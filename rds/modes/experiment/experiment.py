@@ -114,6 +114,14 @@ class Experiment:
         self._folder = Path.cwd()
         self.plan()
 
+    def __repr__(self) -> str:
+        table = self._words.table
+        axis = table.get("axis", "X")
+        axes = ", ".join(map(str, table.get("axes", [axis] if isinstance(axis, str) else axis)))
+        seconds = f", {table['duration']:g} s" if isinstance(table.get("duration"), int | float) else ""
+        machine = table.get("machine", "mini-cnc")
+        return f"<{type(self).__name__}: {table.get('mode', DEFAULT)} of {axes} on {machine}{seconds}>"
+
     @classmethod
     def from_toml(cls, path: str | Path) -> Experiment:
         """The experiment that a file describes; the files that it names are looked for from its own folder."""

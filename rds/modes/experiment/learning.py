@@ -44,6 +44,10 @@ class Learned:
     results: tuple[Result, ...]
     correction: dict[str, np.ndarray]
 
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{axis} from {rms[0]:.3g} to {rms[-1]:.3g}" for axis, rms in self.rms.items())
+        return f"<Learned in {len(self.results)} trials: RMS of the tracking error of {errors} mm>"
+
     @property
     def rms(self) -> dict[str, list[float]]:
         """RMS of each axis's tracking error by trial, mm."""

@@ -227,6 +227,11 @@ class PartProgram(Experiment):
         self.prepared = prepared(self._machine)
         self.plan()
 
+    def __repr__(self) -> str:
+        program = self.prepared.program
+        axes = ", ".join(program.axes)
+        return f"<PartProgram {self.prepared.file.name} on {self._machine.name}: {axes}, {self.prepared.seconds:.6g} s>"
+
     @classmethod
     def from_toml(cls, path: str | Path) -> Experiment:
         """An experiment file says no program: PartProgram(file, experiment=path)."""
