@@ -137,3 +137,38 @@ def test_what_a_part_program_is_run_with_is_checked(given: dict[str, Any], said:
 def test_a_part_program_is_a_file_and_no_device() -> None:
     with pytest.raises(rds.InputError, match="/dev/zero: is a pipe or a device"):
         rds.PartProgram("/dev/zero")
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> tuple[rds.Log, Any]:
+    folder = tmp_path_factory.mktemp("fitted")
+    rds.Experiment(signal=rds.chirp(3.0, 0.5, 5.0, 2.0), duration=2.0).run(out=folder / "run")
+    (log,) = rds.read_log(folder / "run")
+    return log, rds.fit(log, "axis")
+
+
+def test_a_law_is_designed_for_what_a_fit_found(fitted: tuple[rds.Log, Any], tmp_path: Path) -> None:
+    _, estimate = fitted
+    rds.write_model(tmp_path / "fitted.toml", estimate)
+    assert rds.design(estimate).params == rds.design(tmp_path / "fitted.toml").params
+
+
+def test_what_is_not_what_it_should_be_is_named(fitted: tuple[rds.Log, Any]) -> None:
+    log, estimate = fitted
+    for said, do in {
+        "'run' is no log; rds.read_log": lambda: rds.validate(estimate, "run"),
+        "'run.csv' is no log": lambda: rds.fit("run.csv", "axis"),
+        "3 is no log": lambda: rds.frequency_response(3),
+        "2 logs are given, and one is wanted": lambda: rds.compare_models([estimate, estimate], [log, log]),
+        "<Log run: .* is no result; rds.open_result": lambda: rds.compare(log, log),
+        "is no structure; give its name": lambda: rds.fit(log, 3),
+        "structure axis has no option 'viscus'": lambda: rds.structure("axis", "viscus"),
+        "'part.ngc' is no LineSegment": lambda: rds.interpolate("part.ngc", 1e-3),
+        "period = nan s": lambda: rds.frequency_response(log, period=float("nan")),
+        "is what a fit found, and a run wants a file; rds.write_model": lambda: rds.Experiment(model=estimate),
+        "there is no machine 'xxx": lambda: rds.verdict("x" * 5000),
+    }.items():
+        with pytest.raises(rds.InputError, match=said):
+            do()
+    assert rds.verdict("xyzac").ok
+    assert rds.structure("axis", "viscous").options == ("viscous",)

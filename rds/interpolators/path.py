@@ -44,8 +44,7 @@ def interpolate(
     Positions are in whole BLU where one of the methods says so. Raises InputError for segments that don't follow each
     other or that a method doesn't take, ContractError for a user's method that breaks its interface.
     """
-    if isinstance(segments, LineSegment | ArcSegment):
-        segments = [segments]
+    segments = list(segments) if isinstance(segments, Iterable) and not isinstance(segments, str) else [segments]
     base = as_interpolator(DEFAULT if method is None else method)
     pair = (base if lines is None else as_interpolator(lines), base if arcs is None else as_interpolator(arcs))
     names = _names(axes, segments)
@@ -123,6 +122,8 @@ def _streams(
 def _names(axes: Sequence[str] | None, segments: Sequence[Segment]) -> tuple[str, ...]:
     if not segments:
         raise InputError("there is no segment to interpolate; give a line or an arc")
+    if (other := next((each for each in segments if not isinstance(each, LineSegment | ArcSegment)), None)) is not None:
+        raise InputError(f"{other!r:.60} is no LineSegment and no ArcSegment; rds.PartProgram runs a part program")
     count = len(segments[0].start)
     names = tuple(axes or "XYZABC"[:count])
     if len(names) != count:

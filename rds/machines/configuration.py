@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from rds.machines.kinematics.kinematics import Kinematics
 from rds.machines.kinematics.workspace import workspace
 from rds.machines.library import LibraryModule, library_module, told_module
 from rds.machines.link_table import BED, Link, path_to
-from rds.machines.machine import Machine
+from rds.machines.machine import Machine, load_machine
 
 _POSES, _POSES_NUMERIC = 200, 30
 _SMALL = 1e-6
@@ -66,8 +67,12 @@ class Verdict:
 Finding = tuple[str, str]  # link at fault, and why
 
 
-def verdict(machine: Machine) -> Verdict:
-    """Whether the links of a machine make one. InputError for modules that the library does not have."""
+def verdict(machine: Machine | str | Path) -> Verdict:
+    """Whether the links of a machine, or of the one of a name or file, make one.
+
+    InputError for modules that the library does not have.
+    """
+    machine = machine if isinstance(machine, Machine) else load_machine(machine)
     if not machine.links:
         return Verdict(
             machine.name, (Check("chain", None, "it has no links: its axes are all that is known"), _IDENTITY)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
-from rds.core.quantities import Flag, Items, Quantity, Table, Text, near
+from rds.core.quantities import Flag, Items, Quantity, Table, Text, near, shortened
 from rds.core.shared_quantities import NODE, SAMPLE_PERIOD
 from rds.core.toml_table import TomlTable
 from rds.machines.link_table import LINKS, TOOL, WORK, ChainEnd, Link, read_links
@@ -35,6 +35,7 @@ DEFAULT_FEED = Quantity(
 )
 RESOLUTION = Quantity("of the encoder", "axis unit per count", above=0.0)
 PARAMETER = Quantity("parameter of the model")
+_LONGEST_NAME = 200  # characters; a longer one is no file's
 _SLOWEST, _FASTEST = 1e-9, 1e12  # what the planner can still divide by
 LIMITS = Table(
     "what planned motion keeps to; an axis without limits takes part in no part program",
@@ -218,10 +219,10 @@ def load_machine(name: str | Path) -> Machine:
     """
     name = str(name)
     path = Path(name) if name.endswith(".toml") else Path(str(files("rds.machines").joinpath(f"{name}.toml")))
-    if not path.is_file():
+    if len(name) > _LONGEST_NAME or not path.is_file():
         names = machine_names()
         known = f"known machines: {', '.join(names)}, or the path of a .toml file{near(name, names)}"
-        raise InputError(f"there is no machine {name!r}; {known}")
+        raise InputError(f"there is no machine {shortened(name, 80)}; {known}")
     return machine_from(TomlTable.open(path, MACHINE))
 
 

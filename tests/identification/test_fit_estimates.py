@@ -176,5 +176,5 @@ def test_options_that_make_no_sense_are_refused(options, sentence) -> None:
 def test_a_single_log_is_fitted_and_a_path_is_no_log() -> None:
     log, structure = axis_log(mini_cnc("X"), "sine", seconds=3.0), make()
     assert fit(log, structure).values() == fit([log], structure).values()
-    with pytest.raises(InputError, match=r"'run1\.csv' is no log; read it first: fit\(read_log\(FILE\), \.\.\.\)"):
+    with pytest.raises(InputError, match=r"'run1\.csv' is no log; rds\.read_log\(FILE\) gives those of a file"):
         fit("run1.csv", structure)  # type: ignore[arg-type]

@@ -15,6 +15,7 @@ from rds.controllers import tracking
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.core.types import Controller
+from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.model_file import ModelFile, read_model
 from rds.identification.fit.run_model import SPINDLE_UNIT, run_model
 from rds.machines import Machine
@@ -50,13 +51,15 @@ def left_out_of(params: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(sentence for name, sentence in LEFT_OUT.items() if params.get(name))
 
 
-def linear_axis_of(model: Linear | ModelFile | str | Path) -> Linear:
-    """The linear part of the axis that a model file describes; InputError where it has none that can be tracked with.
+def linear_axis_of(model: Linear | ModelFile | Estimate | str | Path) -> Linear:
+    """The linear part of the axis that a model file or a fit describes; InputError where it has none to track with.
 
     A student's structure needs parameters `tau` (s) and `K` ((mm/s)/V) with that meaning. What is linear stays.
     """
     if isinstance(model, Linear):
         return model
+    if isinstance(model, Estimate):
+        model = _unwritten(model)
     file = model if isinstance(model, ModelFile) else read_model(model)
     made = run_model(file)
     if file.structure == "spindle":
@@ -73,6 +76,22 @@ def linear_axis_of(model: Linear | ModelFile | str | Path) -> Linear:
     return Linear(float(params["tau"]), float(params["K"]), tuple(left_out), name, tuple(file.doubts()), unit)
 
 
+def _unwritten(estimate: Estimate) -> ModelFile:
+    """What the model file of a fit would hold of its model."""
+    return ModelFile(
+        estimate.structure,
+        estimate.options,
+        estimate.parameters,
+        estimate.covariance,
+        estimate.method,
+        warnings=estimate.warnings,
+        unidentifiable=estimate.unidentifiable,
+        path=f"the fit of {estimate.structure}",
+        output_unit=estimate.output_unit,
+        command_unit=estimate.command_unit,
+    )
+
+
 def linear_axis_of_machine(machine: Machine, name: str) -> Linear:
     """The linear part of a machine's axis, by the model that the machine's file gives it; InputError for a spindle."""
     axis = machine.axis(name)
@@ -85,17 +104,18 @@ def linear_axis_of_machine(machine: Machine, name: str) -> Linear:
 
 
 def design_tracking(
-    model: Linear | ModelFile | str | Path,
+    model: Linear | ModelFile | Estimate | str | Path,
     *,
     sample_period: float = 0.001,
     poles: Sequence[Any] = tracking.POLES,
     observer_pole: float = tracking.OBSERVER_POLE,
     voltage_range: float = 10.0,
 ) -> Controller:
-    """The tracking controller for the axis of a model file, sampled every `sample_period` s, within ±`voltage_range` V.
+    """The tracking controller for the axis of a model file or a fit.
 
-    `poles` are the two poles of the error, `observer_pole` that of the velocity's observer, 1/s. Hand it in as the
-    `controller` of an Experiment. InputError as for `linear_axis_of`, and for poles too fast for the sampled loop.
+    It is sampled every `sample_period` s and stays within ±`voltage_range` V; `poles` are the two poles of the error,
+    `observer_pole` that of the velocity's observer, 1/s. Hand it in as the `controller` of an Experiment. InputError as
+    for `linear_axis_of`, and for poles too fast for the sampled loop.
     """
     axis = linear_axis_of(model)
     options: dict[str, Any] = {"poles": [*poles], "observer_pole": observer_pole}
@@ -103,7 +123,7 @@ def design_tracking(
 
 
 def tracking_system(
-    model: Linear | ModelFile | str | Path,
+    model: Linear | ModelFile | Estimate | str | Path,
     *,
     sample_period: float | None = None,
     poles: Sequence[Any] = tracking.POLES,
@@ -116,7 +136,7 @@ def tracking_system(
     return tracking_controller_system(axis.tau, axis.K, [*poles], observer_pole, sample_period)
 
 
-def write_tracking(path: str | Path, model: Linear | ModelFile | str | Path, **options: Any) -> Path:
+def write_tracking(path: str | Path, model: Linear | ModelFile | Estimate | str | Path, **options: Any) -> Path:
     """Write the controller of `design_tracking(model, **options)` as a file of the user's own, to read and change."""
     path = Path(path)
     if path.suffix != ".py":

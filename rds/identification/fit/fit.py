@@ -13,7 +13,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.registry import Registry
 from rds.identification.fit.estimate import Estimate
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, as_logs
 from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import for_logs
@@ -43,12 +43,12 @@ def fit(
     `structure` by its name or file where its own options and units are not needed (`rds.structure`). InputError for an
     unknown structure, method or option, no logs, or logs that hold nothing to estimate from.
     """
-    logs = [logs] if isinstance(logs, Log | str | Path) else list(logs)
+    logs = as_logs(logs)
     if not logs:
         raise InputError("there is no log to fit; name at least one")
-    if (other := next((log for log in logs if not isinstance(log, Log)), None)) is not None:
-        raise InputError(f"{other!r:.60} is no log; read it first: fit(read_log(FILE), ...)")
     structure = make_structure(structure) if isinstance(structure, str | Path) else structure
+    if not isinstance(structure, Structure):
+        raise InputError(f"{structure!r:.60} is no structure; give its name, such as 'axis', or rds.structure(...)")
     named = _names_apart(logs)
     structure = for_logs(structure, named)
     if method in _OF_POSITIONS and structure.is_rate and structure.name != "spindle":

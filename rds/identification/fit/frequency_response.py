@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, only_log
 
 _REPEATS = 1e-6  # of the command's range: how exactly a period comes back
 _EXCITED = 0.01  # of the largest amplitude: which lines count as excited
@@ -79,6 +80,7 @@ def frequency_response(log: Log, is_rate: bool | None = None, period: float | No
 
     InputError for a command that excites no frequency, or irregular times.
     """
+    log = only_log(log)
     T = log.sample_period
     off = np.abs(log.time - log.time[0] - T * np.arange(len(log)))
     if off.max() > _JITTER * T:
@@ -133,7 +135,7 @@ def model_response(frequency: np.ndarray, T: float, values: Mapping[str, float],
 
 def _given_period(log: Log, period: float, samples: int) -> int:
     length = period / log.sample_period
-    if abs(length - round(length)) > 1e-3 or not 2 <= round(length) <= samples // 2:
+    if not isfinite(length) or abs(length - round(length)) > 1e-3 or not 2 <= round(length) <= samples // 2:
         raise InputError(
             f"frequency: period = {period:g} s is {length:.6g} samples; it must be a whole number of them, 2 or more, "
             f"and fit twice into the log's {samples}",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -127,3 +128,19 @@ class Log:
             position=self.position[chosen],
             extra={key: values[chosen] for key, values in self.extra.items()},
         )
+
+
+def only_log(given: Any) -> Log:
+    """The log that was given, alone or as the one of a list. InputError for several, and for what is none."""
+    logs = as_logs(given)
+    if len(logs) != 1:
+        raise InputError(f"{len(logs)} logs are given, and one is wanted")
+    return logs[0]
+
+
+def as_logs(given: Any) -> list[Log]:
+    """One log or several as a list. InputError for what is none, such as a file that was not read."""
+    logs = list(given) if isinstance(given, Iterable) and not isinstance(given, Log | str | Path) else [given]
+    if (other := next((log for log in logs if not isinstance(log, Log)), None)) is not None:
+        raise InputError(f"{other!r:.60} is no log; rds.read_log(FILE) gives those of a file")
+    return logs

@@ -41,6 +41,7 @@ def structure(name: str | Path, options: Sequence[str] = (), output: str = "", c
         return replace(make_from_file(name), output_unit=output or "mm", command_unit=command)
     module = LIBRARY.module(str(name))
     known: Sequence[str] = module.OPTIONS
+    options = (options,) if isinstance(options, str) else options
     for option in options:
         if option not in known:
             has = f"it has {', '.join(known)}" if known else "it has none"

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, as_logs, only_log
 from rds.identification.validate.alternatives import with_alternatives
 from rds.identification.validate.assessment import Assessment, assess
 from rds.identification.validate.candidate import Candidate, as_candidate
@@ -93,7 +93,7 @@ def validate(
     Raises InputError for a model or log that will not do.
     """
     candidate = as_candidate(model)
-    logs = [logs] if isinstance(logs, Log) else list(logs)
+    logs = as_logs(logs)
     if not logs:
         raise InputError("there is no log to validate on; name at least one")
     bands = bands or Bands()
@@ -117,7 +117,7 @@ def compare_models(
     if len(models) < 2:
         raise InputError("a comparison needs two models or more")
     first = as_candidate(models[0])
-    a = assess(first, log, initial_samples)
+    a = assess(first, only_log(log), initial_samples)
     return _ranking(first, a, _others(first, models[1:]), bands or Bands(), initial_samples)
 
 

@@ -81,6 +81,18 @@ def _fitted_model(table: TomlTable, setting: Setting) -> Model:
     return run_model(read_model(path), unit=setting.axis.unit)
 
 
+def _refuse_estimate(words: TomlTable, given: Any) -> None:
+    """A run says what file its model is from: InputError for what a fit found, or what was read of a file."""
+    from rds.identification.fit.estimate import Estimate
+    from rds.identification.fit.model_file import ModelFile
+
+    if isinstance(given, ModelFile):
+        raise words.fault("model", f"was read already; give the file itself, model={given.path!r}")
+    if isinstance(given, Estimate):
+        said = "rds.write_model('fitted.toml', estimate) writes it, and model='fitted.toml' runs it"
+        raise words.fault("model", f"is what a fit found, and a run wants a file; {said}")
+
+
 def make_controller(words: TomlTable, setting: Setting, model: Model) -> Controller:
     """The axis's controller, designed for its model where it is a library's."""
     given = words.any("controller")
@@ -158,6 +170,8 @@ def _table_or_student(words: TomlTable, key: str, setting: Setting) -> tuple[Tom
         with named(nameless):
             return nameless, from_function(given)
     elif not isinstance(given, dict):
+        if key == "model":
+            _refuse_estimate(words, given)
         raise words.fault(key, f"must be a name, the path of a .py file, a function, or a table, as in `[{key}]`")
     table = words.table_of(key, given)
     if "file" not in table:
