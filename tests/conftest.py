@@ -41,7 +41,7 @@ settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None)
 settings.load_profile("same")
 
-pytest_plugins = ["held_up", "skipped"]
+pytest_plugins = ["held_up", "kernels_first", "skipped"]
 
 gc.disable()  # until all tests are collected, which is garbage at the end of the run only
 

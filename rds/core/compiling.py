@@ -33,6 +33,7 @@ else:
 
 LONG = 20.0  # s that tiered kernels run in Python before one is compiled
 LOADED = 0.1  # s, the same of a compiled one that is kept on disk: loading all of them takes some 0.4 s
+_AGAIN = 0.5  # s in Python, after which they are looked for on disk again
 _COMPILING = "the planner is being compiled, because this motion is long: that takes some 40 s, once"
 
 _PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"  # in numba's file names
@@ -74,22 +75,23 @@ class TieredKernel:
     Kernels that one in Python calls look at the clock too: one call may take long, of which they do most of the work.
     """
 
-    __slots__ = ("compiled", "enough", "is_kept", "plain")
+    __slots__ = ("compiled", "enough", "is_kept", "looked", "plain")
     spent = 0.0  # s, of all of them in Python
+    looks, next_look = 0, LOADED  # how often they were looked for on disk, and what is spent when they are next
     told = False  # that one is being compiled
     within = _Within()
 
     def __init__(self, plain: Callable[..., Any], compiled: Any) -> None:
         self.plain, self.compiled = plain, compiled
-        # Each for itself: while another process compiles them, or after it was interrupted, only some are there.
-        kept = _kept(Path(compiled.stats.cache_path))
-        self.is_kept = any(f".{plain.__qualname__}-" in name and name.endswith(f".{_PYTHON}.nbi") for name in kept)
-        self.enough = LOADED if self.is_kept else LONG
+        self._look()
 
     def __call__(self, *values: Any, **named: Any) -> Any:
         of, now = TieredKernel, perf_counter()
         since = of.within.since
-        if of.spent + (now - since if since else 0.0) >= self.enough:
+        spent = of.spent + (now - since if since else 0.0)
+        if not self.is_kept and LOADED <= spent < LONG:
+            self._look_again(spent)
+        if spent >= self.enough:
             if not (self.is_kept or of.told):
                 of.told = True
                 warnings.warn(Notice(_COMPILING), stacklevel=2)
@@ -103,6 +105,23 @@ class TieredKernel:
         finally:
             of.within.since = 0.0
             of.spent += perf_counter() - now
+
+    def _look(self) -> None:
+        # Each for itself: while another process compiles them, or after it was interrupted, only some are there.
+        kept = _kept(Path(self.compiled.stats.cache_path))
+        named = f".{self.plain.__qualname__}-"
+        self.is_kept = any(named in name and name.endswith(f".{_PYTHON}.nbi") for name in kept)
+        self.enough = LOADED if self.is_kept else LONG
+        self.looked = TieredKernel.looks
+
+    def _look_again(self, spent: float) -> None:
+        """Another process may have compiled it since."""
+        of = TieredKernel
+        if spent >= of.next_look:
+            of.looks, of.next_look = of.looks + 1, spent + _AGAIN
+            _kept.cache_clear()
+        if self.looked != of.looks:
+            self._look()
 
     def _silently(self, *values: Any, **named: Any) -> Any:
         with np.errstate(all="ignore"):  # compiled kernels say nothing either
@@ -126,7 +145,7 @@ def _compiled(function: F, **options: Any) -> F:
 
 @cache
 def _kept(folder: Path) -> list[str]:
-    """The names of the indexes that numba has there, as they were when they were asked for first."""
+    """The names of the indexes that numba has there, as they were when they were last looked for."""
     return [index.name for index in folder.glob("*.nbi")]
 
 

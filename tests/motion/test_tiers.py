@@ -118,6 +118,7 @@ def test_what_is_not_kept_on_disk_is_compiled_later_and_that_is_said_once(
     (tmp_path / f"kernels.{left.__qualname__}-9.py22.nbi").touch()  # of another Python
     monkeypatch.setattr(Compiled, "stats", SimpleNamespace(cache_path=str(tmp_path)))
     monkeypatch.setattr(TieredKernel, "told", False)
+    monkeypatch.setattr(TieredKernel, "next_look", inf)
     kernels = tiered(kept), tiered(left), tiered(left)
     found = []
     with warnings.catch_warnings(record=True) as said:
@@ -127,6 +128,21 @@ def test_what_is_not_kept_on_disk_is_compiled_later_and_that_is_said_once(
             found.append([kernel() for kernel in kernels])
     assert found == [["in Python"] * 3, ["compiled", "in Python", "in Python"], ["compiled"] * 3]
     assert [note.category for note in said] == [Notice]
+
+
+@pytest.mark.usefixtures("all_in_python")
+def test_what_another_process_has_compiled_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def late() -> str:
+        return "in Python"
+
+    monkeypatch.setattr(Compiled, "stats", SimpleNamespace(cache_path=str(tmp_path)))
+    monkeypatch.setattr(TieredKernel, "next_look", 0.0)
+    kernel, found = tiered(late), []
+    for spent in (1.0, 1.1, 2.0):  # s
+        TieredKernel.spent = spent
+        found.append(kernel())
+        (tmp_path / f"kernels.{late.__qualname__}-1.py{sys.version_info.major}{sys.version_info.minor}.nbi").touch()
+    assert found == ["in Python", "in Python", "compiled"], "it is not looked for at each call"
 
 
 @pytest.mark.usefixtures("all_in_python")
