@@ -47,7 +47,7 @@ def main() -> None:
     ]
     for mode in (BLEND, EXACT_PATH, EXACT_STOP):
         parts = [line(*ends, 10.0, mode=mode, tolerance=0.1) for ends in pairwise(corners)]
-        parts.append(arc(corners[-1], corners[0], (1.0, 1.5, 0.0), 10.0, clockwise=True, mode=mode, tolerance=0.1))
+        parts.append(arc(corners[-1], corners[0], (1.0, 1.5), 10.0, clockwise=True, mode=mode, tolerance=0.1))
         for _ in plan([chain(*parts)], limits, 1e-3, least_time=LeastTime(limits, 1e-3)):
             pass
 
