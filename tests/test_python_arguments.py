@@ -135,6 +135,8 @@ def test_what_a_part_program_is_run_with_is_checked(given: dict[str, Any], said:
 
 
 def test_a_part_program_is_a_file_and_no_device() -> None:
+    with pytest.raises(rds.InputError, match="a table names no part program"):
+        rds.PartProgram.from_table({"machine": "mini-cnc"})
     with pytest.raises(rds.InputError, match="/dev/zero: is a pipe or a device"):
         rds.PartProgram("/dev/zero")
 

@@ -237,6 +237,11 @@ class PartProgram(Experiment):
         """An experiment file says no program: PartProgram(file, experiment=path)."""
         raise InputError("an experiment file names no part program; PartProgram(file, experiment=path)", str(path))
 
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any], folder: str | Path = ".") -> Experiment:
+        """A table says no program, as an experiment file does not."""
+        raise InputError("a table names no part program; PartProgram(file, experiment=path) takes its words of a file")
+
     def start(
         self, mode: str | None = None, *, out: str | Path | None = None, changes: Iterable[Any] = ()
     ) -> ProgramRun:
