@@ -158,7 +158,10 @@ def _table_or_student(words: TomlTable, key: str, setting: Setting) -> tuple[Tom
         with named(nameless):
             return nameless, from_function(given)
     elif not isinstance(given, dict):
-        raise words.fault(key, f"must be a name, the path of a .py file, a function, or a table, as in `[{key}]`")
+        ours = "a function, a python-control system, or a table"
+        scipys = type(given).__module__.startswith("scipy.signal")
+        also = "; of a system of scipy.signal make one by control.ss or control.tf" if scipys else ""
+        raise words.fault(key, f"must be a name, the path of a .py file, {ours}, as in `[{key}]`{also}")
     table = words.table_of(key, given)
     if "file" not in table:
         return table, None
