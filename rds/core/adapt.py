@@ -92,7 +92,7 @@ def _system(obj: Any, role: str) -> Any:
         fractions = zip(chain.from_iterable(obj.num), chain.from_iterable(obj.den), strict=True)
         if any(_degree(num) > _degree(den) for num, den in fractions):
             raise InputError(
-                f"{role}: the numerator of {_name(obj)} has a higher degree than its denominator, so it answers to what "
+                f"{role}: the numerator of {_name(obj)} has a higher degree than its denominator: it answers what "
                 "has not come yet; give it fast poles as well, such as control.tf([Kd, Kp], [0.002, 1]) in place of "
                 "control.tf([Kd, Kp], [1])"
             )
