@@ -68,6 +68,33 @@ def test_nbgrader_s_tree_with_its_time(tmp_path: Path) -> None:
     assert of(tmp_path / "submitted", assignments=("ps1",)).keys() == found.keys()
 
 
+@pytest.mark.parametrize(
+    "stamp, hour",
+    [
+        ("2026-01-09 10:00:00.948203 PST", 18),  # what nbgrader writes in a course of this zone
+        ("2026-07-09 10:00:00.948203 CEST", 8),
+        ("2026-01-09 10:00:00.948203 CET", 9),
+        ("2026-01-09 10:00:00.948203 +0530", 4),
+        ("2026-01-09 10:00:00 -03", 13),
+        ("2026-01-09T10:00:00Z", 10),
+        ("2026-01-09T10:00:00.123456+01:00\n", 9),
+        ("2026-01-09T10:00:00.123456", 10),
+        ("2026-01-09 10:00:00", 10),
+        ("2026-01-09 10:00:00 CST", None),  # America's or China's
+        ("2026-01-09 10:00:00 Mars/Phobos", None),
+        ("yesterday", None),
+        ("", None),
+    ],
+)
+def test_the_time_that_nbgrader_wrote_is_read_in_its_zone(stamp: str, hour: int | None, tmp_path: Path) -> None:
+    tree = {"ada/ps1/controller.py": "a", "ada/ps1/timestamp.txt": stamp, "ben/ps1/controller.py": "b"}
+    ada = of(put(tmp_path, tree), assignments=("ps1",))["ada"]
+    if hour is None:
+        assert ada.time is None and ada.notes[0].startswith("its timestamp.txt cannot be understood")
+    else:
+        assert ada.time is not None and ada.time.astimezone(UTC).hour == hour
+
+
 def test_of_several_assignments_one_must_be_named(tmp_path: Path) -> None:
     tree = {f"ada/{name}/{file}": "" for name in ("ps1", "ps2") for file in ("controller.py", "timestamp.txt")}
     with pytest.raises(InputError, match="several assignments \\(ps1, ps2\\)"):
