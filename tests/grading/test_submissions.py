@@ -175,6 +175,32 @@ def test_canvas_s_zip(tmp_path: Path) -> None:
     assert found["c_113"].read() == b"underscores"
 
 
+def test_blackboard_s_zip_has_the_newest_attempt_of_each_student(tmp_path: Path) -> None:
+    files: dict[str, str | bytes] = {
+        "Task 1_ada_attempt_2026-01-09-10-00-00.txt": "Name: Ada (ada)",
+        "Task 1_ada_attempt_2026-01-09-10-00-00_controller.py": "first",
+        "Task 1_ada_attempt_2026-01-10-10-00-00_controller.py": "second",
+        "Task 1_ben_attempt_2026-01-09-11-00-00_x_ada_attempt_2027-01-01-00-00-00_controller.py": "ben's own",
+        "Task 1_cy_attempt_2026-01-09-12-00-00.txt": "text only",
+    }
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert list(found) == ["ada", "ben", "cy"]
+    assert found["ada"].read() == b"second" and found["ada"].time == datetime(2026, 1, 10, 10, tzinfo=UTC)
+    assert "2026-01-10-10-00-00/controller.py is graded, and not 2026-01-09-10-00-00/" in found["ada"].notes[0]
+    assert found["ben"].read() == b"ben's own"
+    assert found["cy"].status is Status.MISSING
+
+
+def test_blackboard_s_users_with_one_ending_are_kept_apart(tmp_path: Path) -> None:
+    files = {f"Task_{user}_attempt_2026-01-09-10-00-00_controller.py": user for user in ("a_l", "b_l", "cy")}
+    found = of(put(tmp_path, files))
+    assert {name: row.read().decode() for name, row in found.items()} == {
+        "Task_a_l": "a_l",
+        "Task_b_l": "b_l",
+        "cy": "cy",
+    }
+
+
 GRADESCOPE = """---
 submission_1:
   :submitters:
