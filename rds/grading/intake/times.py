@@ -32,7 +32,7 @@ def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
         raise InputError(f"cannot be read: {error}; save it as UTF-8", TIMES) from error
     reader = csv.DictReader(io.StringIO(text))
     if not {"student", "timestamp"} <= set(reader.fieldnames or ()):
-        raise InputError("must have the columns student and timestamp", f"{TIMES}: line 1")
+        raise InputError("must have the columns student and timestamp, with a comma between them", f"{TIMES}: line 1")
     known, found = {handed.student for handed in layout.by_student}, {}
     composed = {unicodedata.normalize("NFC", student): student for student in known}
     for row in reader:
