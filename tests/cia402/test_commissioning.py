@@ -105,6 +105,7 @@ def test_what_is_wrong_with_it_is_told_before_a_file_is_written(
     assert nodes[0].drive.objects.values[0x6072, 0] == 1000
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("says_its_type", [True, False])
 def test_a_device_that_is_no_drive_is_refused_and_not_said_to_be_missing(tmp_path: Path, says_its_type: bool) -> None:
     channel = f"test-{uuid4().hex[:8]}"
