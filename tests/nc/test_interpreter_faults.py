@@ -117,6 +117,13 @@ FAULTS = [
     ("(π) G0 Xβ\nM2", 1, 9, "β", "a number cannot begin with"),
     ("G0 X1 N5\nM2", 1, 7, "N5", "a line number stands first"),
     ("N G0\nM2", 1, 1, "N", "a line number is digits"),
+    (
+        "(abort, no tool)\nM2",
+        1,
+        1,
+        "(",
+        "(ABORT, ...) is outside this dialect; write (MSG, ...), and M2 on the next line",
+    ),
     ("(py,1)\nM2", 1, 1, "(", "(PY, ...) is outside this dialect; write a plain comment, (MSG, ...), (DEBUG, ...) or"),
     ("(PyReload)\nM2", 1, 1, "(", "(PYRELOAD) is outside"),
     ("(abort, now)\nM2", 1, 1, "(", "(ABORT, ...) is outside"),
