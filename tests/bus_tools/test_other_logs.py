@@ -144,6 +144,13 @@ def test_what_candump_logs_may_be_called_txt(tmp_path: Path) -> None:
         list(LogFile(tmp_path / "a.txt"))
 
 
+def test_distances_between_frames_are_not_taken_for_times(tmp_path: Path) -> None:
+    lines = [f" (000.{time:06})  can0  123   [1]  31\n" for time in (0, 10000, 9000)]
+    (tmp_path / "a.log").write_text("".join(lines))  # as `candump -t d` shows them
+    with pytest.raises(InputError, match=r"a\.log:3: .*candump -t d"):
+        list(LogFile(tmp_path / "a.log"))
+
+
 @pytest.mark.parametrize("name", ["a.log", "a.txt"])
 def test_candump_without_times_is_told_how_to_record_them(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("  vcan0  0C8   [8]  F0 00 00 00 00 00 00 00\n")

@@ -177,6 +177,9 @@ class _Candump:
     passive (E). A length of two digits means CAN FD.
     """
 
+    def __init__(self) -> None:
+        self._times: list[float] = []  # the first, and the last
+
     def __call__(self, line: str) -> can.Message | None:
         found = _SHOWN.match(line)
         if found is None:
@@ -188,6 +191,9 @@ class _Candump:
         remote = words[:1] == ["remote"]
         data = b"" if remote else bytes(int(word, 16) for word in words[:size])
         stamp = float(found["time"]) if found["time"] else datetime.fromisoformat(found["date"]).timestamp()
+        if self._times and self._times[0] == 0.0 and stamp < self._times[-1]:
+            raise ValueError("its time goes back: `candump -t d` writes the distance to the frame before; use -t a")
+        self._times = [*self._times[:1], stamp]
         message = _message(stamp, int(identifier, 16), len(identifier) > 3, data, size, found["way"] != "TX", remote)
         message.is_fd = len(found["size"]) > 1
         message.bitrate_switch, message.error_state_indicator = found["fast"] == "B", found["passive"] == "E"
