@@ -106,13 +106,21 @@ class TestAModelAlone:
             ({"U": [1.0, 2.0], "T": times}, r"U has the shape \(2,\)"),
             ({"U": 1.0, "T": [0.0, 0.1, 0.3]}, "not at equal distances"),
             ({"U": 1.0, "T": [0.0]}, "two times or more"),
-            ({"U": 1.0, "T": times, "X0": [1.0]}, "X0 has 1 values; the model has 2 states"),
+            ({"U": 1.0, "T": times, "X0": [1.0]}, r"X0 = \[1.0\] does not fit; give 2 finite numbers"),
+            ({"U": 1.0, "T": times, "X0": [np.nan, 0.0]}, r"X0 = \[nan, 0.0\] does not fit; give 2 finite numbers"),
+            ({"U": 1.0, "T": times, "X0": ["here", 0.0]}, "X0 = .* is not made of real numbers"),
+            ({"U": 1.0 + 1.0j, "T": times}, "U = .* is not made of real numbers"),
+            ({"U": 1.0, "T": ["now", "then"]}, "T = .* is not made of real numbers"),
             ({"U": 1.0, "T": times, "params": {"mass": 1.0}}, "no parameter 'mass'; it has"),
         ],
     )
     def test_what_is_refused(self, arguments: dict[str, object], said: str) -> None:
         with pytest.raises(rds.InputError, match=said):
             rds.lsim("linear-axis", **arguments)
+
+    def test_a_system_of_scipy_is_refused_with_the_way_out(self) -> None:
+        with pytest.raises(rds.InputError, match=r"a python-control system, .*scipy\.signal make one by control\.ss"):
+            rds.lsim(scipy.signal.lti([K], [TAU, 1, 0]), 1.0, self.times)
 
 
 def test_what_a_notebook_shows_of_each_thing_is_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import chain
 from math import isclose
 from typing import Any
 
@@ -88,6 +89,13 @@ def _system(obj: Any, role: str) -> Any:
             f"a library name, or a control.StateSpace or control.nlsys object"
         )
     if hasattr(obj, "num") and hasattr(obj, "den"):
+        fractions = zip(chain.from_iterable(obj.num), chain.from_iterable(obj.den), strict=True)
+        if any(_degree(num) > _degree(den) for num, den in fractions):
+            raise InputError(
+                f"{role}: the numerator of {_name(obj)} has a higher degree than its denominator: it answers what "
+                "has not come yet; give it fast poles as well, such as control.tf([Kd, Kp], [0.002, 1]) in place of "
+                "control.tf([Kd, Kp], [1])"
+            )
         try:
             from control import ss
 
@@ -97,6 +105,10 @@ def _system(obj: Any, role: str) -> Any:
     if not _is_linear(obj) and not hasattr(obj, "dynamics"):
         raise InputError(f"{role}: a {type(obj).__name__} cannot be run; use control.StateSpace or control.nlsys")
     return obj
+
+
+def _degree(coefficients: np.ndarray) -> int:
+    return len(np.trim_zeros(np.atleast_1d(coefficients), "f")) - 1
 
 
 def _is_linear(sys: Any) -> bool:

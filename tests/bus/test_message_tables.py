@@ -75,6 +75,8 @@ def test_a_period_for_those_without_one(tmp_path: Path) -> None:
         ("identifier,period_ms,period_s,length\n1,1,1,8\n", "given twice"),
         ("identifier,period_ms,length\n1,10,8\nfast,10,8\n", ":3: identifier 'fast'"),
         ("identifier,period_ms,length\n1,10\n", ":2: the line has 2 columns"),
+        ("identifier,period_ms,length\n# one\n\n1,10,8\nfast,10,8\n", ":5: identifier 'fast'"),
+        ("identifier,period_ms,length\n", "no messages in it"),
         ("identifier,period_ms,length\n1,10,9\n", "9"),
         ("identifier,period_ms,length\n1,0,8\n", "--sample-period"),
     ],

@@ -97,7 +97,7 @@ def test_a_damaged_line_is_named(name: str, text: str, line: int, tmp_path: Path
 
 def test_a_text_that_is_no_log_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("Dear diary\n")
-    with pytest.raises(InputError, match="no log of CRTD"):
+    with pytest.raises(InputError, match="no log of candump, CRTD"):
         list(LogFile(tmp_path / "a.txt"))
 
 
@@ -109,3 +109,50 @@ def test_what_candump_shows_without_directions(tmp_path: Path) -> None:
         (0x123, b"\x01\x02", False),
         (0x7DF, b"", True),
     ]
+
+
+def test_can_fd_that_candump_shows_is_read_with_its_flags(tmp_path: Path) -> None:
+    data = " ".join(f"{byte:02X}" for byte in range(12))
+    (tmp_path / "a.txt").write_text(
+        f" (1.5)  can0  RX B -  123  [12]  {data}\n (1.6)  can0  TX - E  124  [08]  00 01 02 03 04 05 06 07\n"
+    )
+    log = LogFile(tmp_path / "a.txt")
+    first, second = log
+    assert first.is_fd and first.bitrate_switch and not first.error_state_indicator and first.is_rx
+    assert bytes(first.data) == bytes(range(12))
+    assert second.is_fd and not second.bitrate_switch and second.error_state_indicator and not second.is_rx
+    assert log.skipped == 0
+
+
+def test_candump_may_show_dates_and_texts(tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(
+        " (2020-12-19 12:04:45.485261)  can1  123   [8]  31 30 30 2E 35 20 46 4D   '100.5 FM'\n"
+        " (2020-12-19 12:04:46.485261)  can1  123   [1]  31   '1'\n"
+    )
+    first, second = LogFile(tmp_path / "a.log")
+    assert bytes(first.data) == b"100.5 FM" and second.timestamp - first.timestamp == pytest.approx(1.0, abs=1e-6)
+
+
+def test_what_candump_logs_may_be_called_txt(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("(1700000000.000000) can0 123#11223344\n(1700000000.100000) can0 124##155\n")
+    assert [(m.arbitration_id, bytes(m.data), m.is_fd) for m in LogFile(tmp_path / "a.txt")] == [
+        (0x123, b"\x11\x22\x33\x44", False),
+        (0x124, b"\x55", True),
+    ]
+    (tmp_path / "a.txt").write_text("(1700000000.000000) can0 123#11223344\n(1700000000.100000) can0 124#5\n")
+    with pytest.raises(InputError, match=r"a\.txt:2: .*candump -L"):
+        list(LogFile(tmp_path / "a.txt"))
+
+
+def test_distances_between_frames_are_not_taken_for_times(tmp_path: Path) -> None:
+    lines = [f" (000.{time:06})  can0  123   [1]  31\n" for time in (0, 10000, 9000)]
+    (tmp_path / "a.log").write_text("".join(lines))  # as `candump -t d` shows them
+    with pytest.raises(InputError, match=r"a\.log:3: .*candump -t d"):
+        list(LogFile(tmp_path / "a.log"))
+
+
+@pytest.mark.parametrize("name", ["a.log", "a.txt"])
+def test_candump_without_times_is_told_how_to_record_them(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("  vcan0  0C8   [8]  F0 00 00 00 00 00 00 00\n")
+    with pytest.raises(InputError, match="no times; record with `candump -L`"):
+        list(LogFile(tmp_path / name))

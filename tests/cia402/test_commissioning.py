@@ -8,8 +8,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
+from uuid import uuid4
 
 import can
+import canopen
 import pytest
 from typer.testing import CliRunner
 
@@ -101,6 +103,24 @@ def test_what_is_wrong_with_it_is_told_before_a_file_is_written(
         made(channel, tmp_path, distance=20)
     assert not nodes[0].drive.operation.machine.state.name.startswith("OPERATION")
     assert nodes[0].drive.objects.values[0x6072, 0] == 1000
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("says_its_type", [True, False])
+def test_a_device_that_is_no_drive_is_refused_and_not_said_to_be_missing(tmp_path: Path, says_its_type: bool) -> None:
+    channel = f"test-{uuid4().hex[:8]}"
+    network = canopen.Network()
+    network.connect(interface="virtual", channel=channel)
+    try:
+        device = network.create_node(2, canopen.ObjectDictionary())
+        if says_its_type:
+            device.data_store[0x1000] = {0: (401).to_bytes(4, "little")}
+        with pytest.raises(
+            MachineError, match=r"node 2 \(without a name\) is no CiA 402 drive: it has no statusword \(0x6041\)"
+        ):
+            made(channel, tmp_path)
+    finally:
+        network.disconnect()
 
 
 @pytest.mark.realtime

@@ -155,6 +155,8 @@ def test_only_python_controls_objects_are_systems():
 @pytest.mark.parametrize(
     "adapt, system, faults",
     [
+        (as_controller, control.tf([0.1, 30.0], [1.0]), ["higher degree", "control.tf([Kd, Kp], [0.002, 1])"]),
+        (as_model, control.tf([1.0, 0.0, 0.0], [0.0, 1.0, 0.5], T), ["higher degree"]),
         (as_controller, control.ss([[0.5]], [[1.0]], [[1.0]], 0, 0.01), ["dt = 0.01 s", "0.001 s"]),
         (as_model, AXIS.sample(0.002), ["dt = 0.002 s", "0.001 s"]),
         (as_controller, control.ss([], [], [], np.ones((1, 3))), ["3 inputs", "r - y"]),

@@ -94,6 +94,17 @@ def test_who_is_late_loses_and_whose_notebook_was_cut_is_told(outcome: BatchOutc
     assert any("only these are graded" in note for note in gus.notes)
 
 
+def test_whose_time_cannot_be_understood_is_named(tmp_path: Path) -> None:
+    assignment_in(tmp_path / "task", ASSIGNMENT, law())
+    told = {"ada/task/timestamp.txt": "2026-01-12 10:00:00 CST", "ben/task/timestamp.txt": "2026-01-12 10:00:00 CET"}
+    put(tmp_path / "in", {f"{name}/task/readme.txt": "" for name in ("ada", "ben")} | told)
+    notes = run_batch(tmp_path / "task", tmp_path / "in", tmp_path / "out", jobs=1).notes
+    assert any(
+        note.startswith("ada: its timestamp.txt cannot be understood ('2026-01-12 10:00:00 CST')") for note in notes
+    )
+    assert not any(note.startswith("ben") for note in notes)
+
+
 def test_what_the_folder_holds(place: Path, outcome: BatchOutcome) -> None:
     out = place / "out"
     for name, grade in outcome.grades.items():

@@ -373,6 +373,13 @@ def test_refusals(tmp_path: Path) -> None:
     assert not list(out.glob("*.csv"))
 
 
+def test_a_gradebook_with_decimal_commas_is_to_be_downloaded_with_commas_between_cells(tmp_path: Path) -> None:
+    out = batch_in(tmp_path / "out", [grade("ada")])
+    (tmp_path / "book.csv").write_text("Identifier;Full name;Grade;Maximum Grade\nParticipant 501;Ada;;30,00\n")
+    with pytest.raises(InputError, match="longer than its headings; download it in English, with comma as separator"):
+        export(out, "moodle", None, ExportOptions(gradebook=tmp_path / "book.csv"))
+
+
 @given(st.text())
 def test_no_cell_of_a_table_is_a_formula(text: str) -> None:
     (row,) = csv.reader(io.StringIO(csv_text([[text, "x"]]), newline=""))

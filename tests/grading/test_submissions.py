@@ -68,6 +68,33 @@ def test_nbgrader_s_tree_with_its_time(tmp_path: Path) -> None:
     assert of(tmp_path / "submitted", assignments=("ps1",)).keys() == found.keys()
 
 
+@pytest.mark.parametrize(
+    "stamp, hour",
+    [
+        ("2026-01-09 10:00:00.948203 PST", 18),  # what nbgrader writes in a course of this zone
+        ("2026-07-09 10:00:00.948203 CEST", 8),
+        ("2026-01-09 10:00:00.948203 CET", 9),
+        ("2026-01-09 10:00:00.948203 +0530", 4),
+        ("2026-01-09 10:00:00 -03", 13),
+        ("2026-01-09T10:00:00Z", 10),
+        ("2026-01-09T10:00:00.123456+01:00\n", 9),
+        ("2026-01-09T10:00:00.123456", 10),
+        ("2026-01-09 10:00:00", 10),
+        ("2026-01-09 10:00:00 CST", None),  # America's or China's
+        ("2026-01-09 10:00:00 Mars/Phobos", None),
+        ("yesterday", None),
+        ("", None),
+    ],
+)
+def test_the_time_that_nbgrader_wrote_is_read_in_its_zone(stamp: str, hour: int | None, tmp_path: Path) -> None:
+    tree = {"ada/ps1/controller.py": "a", "ada/ps1/timestamp.txt": stamp, "ben/ps1/controller.py": "b"}
+    ada = of(put(tmp_path, tree), assignments=("ps1",))["ada"]
+    if hour is None:
+        assert ada.time is None and ada.notes[0].startswith("its timestamp.txt cannot be understood")
+    else:
+        assert ada.time is not None and ada.time.astimezone(UTC).hour == hour
+
+
 def test_of_several_assignments_one_must_be_named(tmp_path: Path) -> None:
     tree = {f"ada/{name}/{file}": "" for name in ("ps1", "ps2") for file in ("controller.py", "timestamp.txt")}
     with pytest.raises(InputError, match="several assignments \\(ps1, ps2\\)"):
@@ -146,6 +173,32 @@ def test_canvas_s_zip(tmp_path: Path) -> None:
     assert found["lovelaceada_111"].read() == b"second"
     assert "Canvas marks it as late" in found["benson_112"].notes[0] and found["benson_112"].time is None
     assert found["c_113"].read() == b"underscores"
+
+
+def test_blackboard_s_zip_has_the_newest_attempt_of_each_student(tmp_path: Path) -> None:
+    files: dict[str, str | bytes] = {
+        "Task 1_ada_attempt_2026-01-09-10-00-00.txt": "Name: Ada (ada)",
+        "Task 1_ada_attempt_2026-01-09-10-00-00_controller.py": "first",
+        "Task 1_ada_attempt_2026-01-10-10-00-00_controller.py": "second",
+        "Task 1_ben_attempt_2026-01-09-11-00-00_x_ada_attempt_2027-01-01-00-00-00_controller.py": "ben's own",
+        "Task 1_cy_attempt_2026-01-09-12-00-00.txt": "text only",
+    }
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert list(found) == ["ada", "ben", "cy"]
+    assert found["ada"].read() == b"second" and found["ada"].time == datetime(2026, 1, 10, 10, tzinfo=UTC)
+    assert "2026-01-10-10-00-00/controller.py is graded, and not 2026-01-09-10-00-00/" in found["ada"].notes[0]
+    assert found["ben"].read() == b"ben's own"
+    assert found["cy"].status is Status.MISSING
+
+
+def test_blackboard_s_users_with_one_ending_are_kept_apart(tmp_path: Path) -> None:
+    files = {f"Task_{user}_attempt_2026-01-09-10-00-00_controller.py": user for user in ("a_l", "b_l", "cy")}
+    found = of(put(tmp_path, files))
+    assert {name: row.read().decode() for name, row in found.items()} == {
+        "Task_a_l": "a_l",
+        "Task_b_l": "b_l",
+        "cy": "cy",
+    }
 
 
 GRADESCOPE = """---

@@ -99,6 +99,8 @@ FAULTS = [
     ("M98 L2\nM2", 1, 1, "M98", "M98 without P"),
     ("M98 P5 X1\nM2", 1, 8, "X1", "only P, L and a comment can follow M98"),
     ("M98 P5\nM2\nO5\nO5 ENDSUB\nM2", 4, 1, "O5", "O5 ENDSUB does not end this; write M99"),
+    ("O5 CALL\nG4 P1\nO5 SUB\nO5 ENDSUB\nM2", 3, 1, "O5", "the program runs into the subroutine O5"),
+    ("O5 SUB\nO5 ENDSUB\nO5 SUB\nO5 ENDSUB\nM2", 3, 1, "O5", "the subroutine O5 is defined already, in line 1"),
     ("M98 P5\nM2\nO5 SUB\nO5 ENDSUB\nM2", 3, 1, "O5", "O5 SUB is called by M98"),
     ("O5 CALL\nM2\nO5\nM99\n", 3, 1, "O5", "the program O5 is called by O5 CALL; write M98 P5"),
     ("$H\nG0 X1\nM2", 1, 1, "$", "settings and commands of a sender or of Grbl ($H homes"),
@@ -115,6 +117,13 @@ FAULTS = [
     ("(π) G0 Xβ\nM2", 1, 9, "β", "a number cannot begin with"),
     ("G0 X1 N5\nM2", 1, 7, "N5", "a line number stands first"),
     ("N G0\nM2", 1, 1, "N", "a line number is digits"),
+    (
+        "(abort, no tool)\nM2",
+        1,
+        1,
+        "(",
+        "(ABORT, ...) is outside this dialect; write (MSG, ...), and M2 on the next line",
+    ),
     ("(py,1)\nM2", 1, 1, "(", "(PY, ...) is outside this dialect; write a plain comment, (MSG, ...), (DEBUG, ...) or"),
     ("(PyReload)\nM2", 1, 1, "(", "(PYRELOAD) is outside"),
     ("(abort, now)\nM2", 1, 1, "(", "(ABORT, ...) is outside"),
@@ -152,6 +161,10 @@ FAULTS = [
     ("G0 X" + 250 * "1", 1, 0, "", "longer than 252 characters"),
     ("G0 X" + 60 * "[" + "1" + 60 * "]" + "\nM2", 1, 55, "[", "more than 50 deep"),
 ]
+
+
+def test_m99_in_a_subroutine_is_named_once() -> None:
+    assert fault("O5 CALL\nM2\nO5 SUB\nM99\nM2").reason == "M99 does not end this; write O5 ENDSUB"
 
 
 @pytest.mark.parametrize(("text", "line", "column", "word", "message"), FAULTS, ids=lambda value: repr(value)[:40])

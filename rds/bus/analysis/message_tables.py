@@ -47,6 +47,8 @@ def read_messages(path: Path, period: float | None = None) -> MessageTable:
     if not path.is_file():
         raise InputError("there is no such file; check the name", str(path))
     found = _of_dbc(path, period) if path.suffix.lower() == ".dbc" else _of_csv(path, period)
+    if not found.messages and not found.without_period:
+        raise InputError("there are no messages in it; name a table of messages", str(path))
     if not found.messages:
         raise InputError("no message of the file has a period; give one for all by --sample-period, in s", str(path))
     return found
@@ -88,10 +90,11 @@ def _of_csv(path: Path, period: float | None) -> MessageTable:
         separator = max(",;\t", key=head.count)
         columns = [column.strip().lower() for column in head.rstrip("\r\n").split(separator)]
         _check_columns(columns, path)
-        for row in csv.reader(file, delimiter=separator):
+        reader = csv.reader(file, delimiter=separator)
+        for row in reader:
             if not row or row[0].lstrip().startswith("#"):
                 continue
-            where = f"{path}:{len(messages) + len(silent) + 2}"
+            where = f"{path}:{reader.line_num + 1}"
             if len(row) != len(columns):
                 raise InputError(f"the line has {len(row)} columns, and the heading {len(columns)}", where)
             message = _message(dict(zip(columns, map(str.strip, row), strict=True)), period, where)

@@ -38,7 +38,7 @@ from rds.bus.tools import log_lock, log_writers
 from rds.bus.tools.log_bombs import check_mf4, check_table
 from rds.bus.tools.log_lines import TEXT, Lines
 from rds.bus.tools.mf4 import asammdf_missing, bring_asammdf, close_unopened
-from rds.bus.tools.other_logs import kind_of, read_other
+from rds.bus.tools.other_logs import LOGGED, UNTIMED, kind_of, read_other
 from rds.core.errors import InputError
 from rds.core.private_files import open_private
 
@@ -111,23 +111,27 @@ class LogFile:
         """The frames of a text, by the tool that wrote it."""
         with self._open() as file:
             kind = None if self._packed else kind_of(file)
+            if kind == UNTIMED:
+                raise InputError("candump has written no times; record with `candump -L` or `-t a`", f"{self.path}:1")
             if kind is None and self._ending in _OTHERS:
-                raise InputError("it is no log of CRTD or Microchip's CAN BUS Analyzer; is it a log?", str(self.path))
-            if kind is not None:
+                raise InputError(
+                    "it is no log of candump, CRTD or Microchip's CAN BUS Analyzer; is it a log?", str(self.path)
+                )
+            if kind not in (None, LOGGED):
                 self.skipped = 0
                 yield from read_other(file, kind, str(self.path), self._skip)
                 return
-        yield from self._lines()
+        yield from self._lines(".log" if kind == LOGGED else self._ending)
 
     def _skip(self) -> None:
         self.skipped += 1
 
-    def _lines(self) -> Iterator[can.Message]:
+    def _lines(self, ending: str) -> Iterator[can.Message]:
         with self._open() as file:
-            lines = Lines(file, str(self.path), self._ending, self.path.stat().st_size if self._packed else 0)
+            lines = Lines(file, str(self.path), ending, self.path.stat().st_size if self._packed else 0)
             found = False
             try:
-                for message in _READERS[self._ending](cast(TextIO, lines)):
+                for message in _READERS[ending](cast(TextIO, lines)):
                     lines.frames += 1
                     problem = _problem(message)
                     if problem:
@@ -135,7 +139,7 @@ class LogFile:
                     found = True
                     yield message
             except (*_DAMAGE, zlib.error, gzip.BadGzipFile) as error:
-                raise lines.fault(f"it can't be read as {self._ending}: {error or 'damaged'}") from error
+                raise lines.fault(f"it can't be read as {ending}: {error or 'damaged'}") from error
             nothing = None if found else lines.nothing()
             if nothing:
                 raise nothing

@@ -1,5 +1,5 @@
 """Text logs that python-can does not read: SavvyCAN's and GVRET's CSV, BusMaster, CRTD, Microchip's CAN BUS Analyzer,
-and what `candump -t a` shows on a terminal.
+and what `candump -t a`, `-t z` and `-t A` show on a terminal. `candump -L` is known here too, and read elsewhere.
 
 They are recognized by their first lines, not by their names: .csv, .log and .txt are used by several tools.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from datetime import datetime
 from typing import TextIO
 
 import can
@@ -21,10 +22,14 @@ Parse = Callable[[str], can.Message | None]  # a line; None: it describes no fra
 _CRTD = re.compile(r"\d+\.\d+\s+\d*(?:[RT](?:11|29)|C[A-Z]{2})\b")
 _MICROCHIP = re.compile(r"\s*(?://-{3,}|Microchip Technology)")
 _BUSMASTER = re.compile(r"\*{3}BUSMASTER")
-_SHOWN = re.compile(
-    r"\s*\((?P<time>\d+\.\d+)\)\s+\S+\s+(?:(?P<way>RX|TX)\s+\S\s+\S\s+)?"
+_SHOWN_FRAME = (
+    r"\S+\s+(?:(?P<way>RX|TX)\s+(?P<fast>\S)\s+(?P<passive>\S)\s+)?"
     r"(?P<id>[0-9A-F]{3}|[0-9A-F]{8})\s+\[(?P<size>\d+)\]"
 )
+_SHOWN = re.compile(rf"\s*\((?:(?P<time>\d+\.\d+)|(?P<date>\d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+))\)\s+{_SHOWN_FRAME}")
+_SHOWN_UNTIMED = re.compile(rf"\s*{_SHOWN_FRAME}")
+_LOGGED = re.compile(r"\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#")
+LOGGED, UNTIMED = "candump -L", "candump without times"  # kinds that `read_other` does not read
 _GVRET = re.compile(r"Time ?Stamp,\s*ID,\s*Extended,", re.IGNORECASE)
 
 
@@ -33,7 +38,15 @@ def kind_of(file: TextIO) -> str | None:
     head = file.read(_HEAD)
     file.seek(0)
     first = head.lstrip("\ufeff")
-    patterns = {"GVRET": _GVRET, "BusMaster": _BUSMASTER, "Microchip": _MICROCHIP, "CRTD": _CRTD, "candump": _SHOWN}
+    patterns = {
+        "GVRET": _GVRET,
+        "BusMaster": _BUSMASTER,
+        "Microchip": _MICROCHIP,
+        "CRTD": _CRTD,
+        "candump": _SHOWN,
+        LOGGED: _LOGGED,
+        UNTIMED: _SHOWN_UNTIMED,
+    }
     for kind, pattern in patterns.items():
         if pattern.match(first):
             return kind
@@ -158,7 +171,14 @@ class _Microchip:
 
 
 class _Candump:
-    """Time in s in brackets, channel, identifier, length in brackets (two digits: CAN FD), bytes in hexadecimal."""
+    """Time in s or date in brackets, channel, identifier, length in brackets, bytes in hexadecimal.
+
+    With -x the direction comes before the identifier, and of CAN FD whether the data are fast (B) and the sender error
+    passive (E). A length of two digits means CAN FD.
+    """
+
+    def __init__(self) -> None:
+        self._times: list[float] = []  # the first, and the last
 
     def __call__(self, line: str) -> can.Message | None:
         found = _SHOWN.match(line)
@@ -166,10 +186,15 @@ class _Candump:
             raise ValueError("no time in brackets, identifier and length")
         words = line[found.end() :].split()
         identifier, size = found["id"], int(found["size"])
-        if "ERRORFRAME" in words or len(found["size"]) > 1:
+        if "ERRORFRAME" in words:
             return None
         remote = words[:1] == ["remote"]
         data = b"" if remote else bytes(int(word, 16) for word in words[:size])
-        return _message(
-            float(found["time"]), int(identifier, 16), len(identifier) > 3, data, size, found["way"] != "TX", remote
-        )
+        stamp = float(found["time"]) if found["time"] else datetime.fromisoformat(found["date"]).timestamp()
+        if self._times and self._times[0] == 0.0 and stamp < self._times[-1]:
+            raise ValueError("its time goes back: `candump -t d` writes the distance to the frame before; use -t a")
+        self._times = [*self._times[:1], stamp]
+        message = _message(stamp, int(identifier, 16), len(identifier) > 3, data, size, found["way"] != "TX", remote)
+        message.is_fd = len(found["size"]) > 1
+        message.bitrate_switch, message.error_state_indicator = found["fast"] == "B", found["passive"] == "E"
+        return message

@@ -33,6 +33,7 @@ from rds.grading.course.groups import by_group
 from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Grade, Status
 from rds.grading.intake import Intake, collect
+from rds.grading.intake.times import NOT_UNDERSTOOD
 from rds.grading.review.publish import SIMILARITY, publish
 from rds.grading.sandbox import available
 
@@ -128,10 +129,14 @@ def _untimed(assignment: Assignment, intake: Intake) -> list[str]:
     unknown = [row.student for row in intake.rows if row.time is None]
     if assignment.due is None or assignment.late == LateRules() or not unknown:
         return []
-    return [
+    notes = [
         f"when they handed in is not known of {len(unknown)} of {len(intake.rows)} submissions, so nothing is deducted "
         "for lateness there; timestamps.csv (student,timestamp) at the top of the submissions says it"
     ]
+    for row in intake.rows:
+        unread = [note for note in row.notes if row.time is None and note.startswith(NOT_UNDERSTOOD)]
+        notes.extend(f"{row.student}: {note}" for note in unread)
+    return notes
 
 
 def _check_sandbox(how: BatchOptions) -> None:

@@ -69,7 +69,8 @@ def read_sheet(path: Path) -> Sheet:
         raise InputError("is empty; download it once more", str(path))
     width = len(rows[0])
     if any(len(row) > width and any(row[width:]) for row in rows):
-        raise InputError("has rows that are longer than its headings; download it once more", str(path))
+        remedy = "in English, with comma as separator" if head.count(";") > head.count(",") else "once more"
+        raise InputError(f"has rows that are longer than its headings; download it {remedy}", str(path))
     return Sheet(rows[0], [(row + [""] * width)[:width] for row in rows[1:]], has_mark, (encoding, delimiter))
 
 

@@ -3,6 +3,7 @@
 submitted/ada/ps1/controller.py                          nbgrader
 Ada Lovelace_12345_assignsubmission_file_/controller.py  Moodle, also without the folder
 lovelaceada_LATE_12345_67890_controller-1.py             Canvas
+Task 1_ada_attempt_2026-01-09-10-00-00_controller.py     Blackboard
 submission_12345/controller.py, submission_metadata.yml  Gradescope
 ada/controller.py, ada.py                                a folder, or a file, of each student
 """
@@ -12,6 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from typing import Any
 
 from rds.core.errors import InputError
@@ -27,6 +29,10 @@ _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|online
 # students choose their names there, and files', and Moodle puts the number behind the name: of a folder the last counts
 _MOODLE_FOLDER = re.compile(r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)_?", re.DOTALL)
 _MOODLE_NUMBERS = re.compile(r"_(\d+)(?=_assignsubmission_(?:file|onlinetext)_)")
+# the first attempt is Blackboard's: what follows is the file's name, which the student chose
+_BLACKBOARD = re.compile(
+    r"(?P<before>.+?_(?P<user>[^_]+))_attempt_(?P<time>\d{4}(?:-\d\d){5})(?:_(?P<file>.+)|\.txt)", re.DOTALL
+)
 _CANVAS = re.compile(r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<id>\d+)_(?P<number>\d+)_(?P<file>.+)", re.DOTALL)
 
 
@@ -81,6 +87,11 @@ def sorted_out(items: Sequence[Item], folders: Sequence[str], assignments: Seque
         for item in items:
             sorting.canvas(item)
         return sorting.layout("canvas", times)
+    if _mostly(items, lambda item: len(item.parts) == 1 and _BLACKBOARD.fullmatch(item.name)):
+        sorting.blackboard(items)
+        for student in folders:
+            sorting.files_of(student)
+        return sorting.layout("blackboard", times)
     if _is_nbgrader(items, assignments):
         name = _assignment(items, assignments)
         for item in items:
@@ -186,6 +197,27 @@ class _Sorting:
         if found["late"] and not handed.notes:
             handed.notes.append(f"Canvas marks it as late, and not by how much; {TIMES} beside the files can say when")
         handed.items.append(replace(item, parts=(found["file"],)))
+
+    def blackboard(self, items: Sequence[Item]) -> None:
+        """The files of all attempts; what is written in text (`.txt` right behind the time) is nobody's file."""
+        found = [_BLACKBOARD.fullmatch(item.name) if len(item.parts) == 1 else None for item in items]
+        users: dict[str, set[str]] = {}
+        for match in found:
+            if match is not None:
+                users.setdefault(match["user"], set()).add(match["before"])
+        for item, match in zip(items, found, strict=True):
+            if match is None:
+                self.plain(item)
+                continue
+            alone = len(users[match["user"]]) == 1  # else names with _ in them end alike
+            handed = self.files_of(match["user"] if alone else match["before"], platform="blackboard")
+            handed.has_times = True
+            if match["file"]:
+                try:
+                    when = datetime.strptime(match["time"], "%Y-%m-%d-%H-%M-%S")
+                except ValueError:
+                    when = None
+                handed.items.append(replace(item, parts=(match["time"], match["file"]), time=when))
 
     def files_of_gradescope(self, folder: str, submitters: dict[str, Submitter]) -> StudentFiles:
         who = submitters.get(folder)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import csv
 import io
 import unicodedata
-from datetime import UTC, datetime, tzinfo
+from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from zoneinfo import ZoneInfo
 
 from rds.core.errors import InputError
 from rds.grading.intake.items import Refusal
 from rds.grading.intake.layouts import STAMP, TIMES, Layout, StudentFiles
 
+NOT_UNDERSTOOD = f"its {STAMP} cannot be understood"  # begins a note
 _LARGEST = 4 << 20  # bytes
+# Hours of those that mean one zone only (CST, IST and BST are several) and are no names of the time zone database.
+_ABBREVIATIONS = {"AKDT": -8, "AKST": -9, "PDT": -7, "PST": -8, "MDT": -6, "CDT": -5, "EDT": -4}
+_ABBREVIATIONS |= {"WEST": 1, "CEST": 2, "EEST": 3, "MSK": 3, "JST": 9, "KST": 9, "AEST": 10, "AEDT": 11}
 
 
 def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
@@ -28,7 +32,7 @@ def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
         raise InputError(f"cannot be read: {error}; save it as UTF-8", TIMES) from error
     reader = csv.DictReader(io.StringIO(text))
     if not {"student", "timestamp"} <= set(reader.fieldnames or ()):
-        raise InputError("must have the columns student and timestamp", f"{TIMES}: line 1")
+        raise InputError("must have the columns student and timestamp, with a comma between them", f"{TIMES}: line 1")
     known, found = {handed.student for handed in layout.by_student}, {}
     composed = {unicodedata.normalize("NFC", student): student for student in known}
     for row in reader:
@@ -49,19 +53,30 @@ def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
 
 
 def stamped_time(handed: StudentFiles) -> datetime | None:
-    """nbgrader's own `timestamp.txt`: date, time and the zone's name. None, with a note, if it cannot be understood."""
+    """nbgrader's own `timestamp.txt`: date and time, and the zone. None, with a note, if it cannot be understood."""
     if handed.stamp is None:
         return None
+    text = ""
     try:
         text = handed.stamp.read(_LARGEST).decode().strip()
-        date, clock, *zone = text.split()
-        when = datetime.fromisoformat(f"{date} {clock}")
-        if when.tzinfo is None:
-            when = when.replace(tzinfo=UTC if not zone or zone[0] in ("UTC", "GMT") else ZoneInfo(zone[0]))
-        return when
+        when = _nbgrader_time(text)
+        return when if when.tzinfo else when.replace(tzinfo=UTC)
     except (Refusal, UnicodeDecodeError, ValueError, KeyError, OSError):
-        handed.notes.append(f"its {STAMP} cannot be understood, and so is taken for nothing")
+        handed.notes.append(f"{NOT_UNDERSTOOD} ({text[:60]!r}), and so is taken for nothing")
         return None
+
+
+def _nbgrader_time(text: str) -> datetime:
+    """A time of ISO 8601, or one with its zone behind: the name, or the abbreviation that %Z of Python gives."""
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        moment, zone = text.rsplit(maxsplit=1)
+        if zone[0] in "+-":
+            return datetime.fromisoformat(moment + zone)
+        hours = _ABBREVIATIONS.get(zone)
+        known = ZoneInfo(zone) if hours is None else timezone(timedelta(hours=hours))
+        return datetime.fromisoformat(moment).replace(tzinfo=known)
 
 
 def with_zone(when: datetime | None, zone: tzinfo | None) -> datetime | None:

@@ -37,7 +37,7 @@ def lsim(
 
     Raises InputError for times, voltages, states or parameters that do not fit, ContractError for a model that fails.
     """
-    times = np.asarray(T, float)
+    times = _numbers("T", T)
     if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)):
         raise InputError(
             f"T has the shape {times.shape}; give two times or more in s, as np.arange(0.0, 1.0, 0.001) does"
@@ -45,7 +45,7 @@ def lsim(
     period = float((times[-1] - times[0]) / (len(times) - 1))
     if period <= 0.0 or np.abs(times - times[0] - period * np.arange(len(times))).max() > _REGULAR * period:
         raise InputError("the times in T are not at equal distances; give them as np.arange(0.0, 1.0, 0.001) does")
-    voltage = np.asarray(U, float)
+    voltage = _numbers("U", U)
     if voltage.shape not in ((), (1,), times.shape) or not np.all(np.isfinite(voltage)):
         raise InputError(
             f"U has the shape {voltage.shape}; give one finite voltage in V, or {len(times)}, one for each time"
@@ -57,9 +57,11 @@ def lsim(
     if unknown := [name for name in params or {} if name not in model.params]:
         raise InputError(f"the model has no parameter {unknown[0]!r}; it has {', '.join(model.params) or 'none'}")
     numbers = dict(model.params) | dict(params or {})
-    state = model.initial_state if X0 is None else [float(value) for value in np.atleast_1d(X0)]
-    if len(state) != len(model.initial_state):
-        raise InputError(f"X0 has {len(state)} values; the model has {len(model.initial_state)} states")
+    state = model.initial_state if X0 is None else np.atleast_1d(_numbers("X0", X0)).tolist()
+    if np.shape(state) != (len(model.initial_state),) or not np.all(np.isfinite(state)):
+        raise InputError(
+            f"X0 = {list(state)} does not fit; give {len(model.initial_state)} finite numbers, one for each state"
+        )
     states = np.empty((len(times), len(state)))
     output = np.empty(len(times))
     for k, u in enumerate(voltage):
@@ -72,3 +74,12 @@ def lsim(
         if k + 1 < len(times):
             state = model.advance(state, float(u), period, numbers)
     return times, output, states
+
+
+def _numbers(name: str, values: Any) -> np.ndarray:
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{name} = {values!r:.100} is not made of real numbers: {error}; give an array of floats"
+        ) from error

@@ -172,7 +172,10 @@ def _table_or_student(words: TomlTable, key: str, setting: Setting) -> tuple[Tom
     elif not isinstance(given, dict):
         if key == "model":
             _refuse_estimate(words, given)
-        raise words.fault(key, f"must be a name, the path of a .py file, a function, or a table, as in `[{key}]`")
+        ours = "a function, a python-control system, or a table"
+        scipys = type(given).__module__.startswith("scipy.signal")
+        also = "; of a system of scipy.signal make one by control.ss or control.tf" if scipys else ""
+        raise words.fault(key, f"must be a name, the path of a .py file, {ours}, as in `[{key}]`{also}")
     table = words.table_of(key, given)
     if "file" not in table:
         return table, None

@@ -151,9 +151,16 @@ class Control(Branches):
             self._define(word)
         elif not self._frames:
             if word.name in self._labels:
-                line = self._labels[word.name].place.line
+                known = self._labels[word.name]
+                if known.source is self.source and known.place == self.source.place:
+                    raise Fault(
+                        f"the program runs into the subroutine {word.spelled}, which it has called before; end it"
+                        " with M2 above that, or define it above its first call",
+                        at=word.at,
+                    )
                 raise Fault(
-                    f"the subroutine {word.spelled} is defined already, in line {line}; take another name", at=word.at
+                    f"the subroutine {word.spelled} is defined already, in line {known.place.line}; take another name",
+                    at=word.at,
                 )
             self._define(word)
             self._skip_to(word.name)
@@ -225,7 +232,8 @@ class Control(Branches):
             frame = self._frames[-1]
             if (frame.kept is None) != (word.kind == "m99"):
                 ends = "M99" if frame.kept is None else f"{spelled(frame.name)} ENDSUB"
-                raise Fault(f"{word.spelled} {word.kind.upper()} does not end this; write {ends}", at=word.at)
+                found = "M99" if word.kind == "m99" else f"{word.spelled} {word.kind.upper()}"
+                raise Fault(f"{found} does not end this; write {ends}", at=word.at)
             # RETURN may bear the label of the branch or loop that it stands in: LinuxCNC's own examples are written so
             within = word.kind == "return" and f"{frame.name}#{word.name}" in self._labels
             if word.name != frame.name and not within:

@@ -110,4 +110,6 @@ def no_such_letter(letter: str, line: str = "") -> str:
 
 def active_comment(name: str) -> str:
     shown = f"({name.upper().replace(',', ', ...')})"
+    if name.lower().startswith("abort"):
+        return f"{shown} is outside this dialect; write (MSG, ...), and M2 on the next line, which ends the program"
     return f"{shown} is outside this dialect; write a plain comment, (MSG, ...), (DEBUG, ...) or (PRINT, ...)"

@@ -21,7 +21,7 @@ from rds.bus.modules.cia402.codes import Mode, NmtCommand
 from rds.bus.modules.cia402.commissioned import Choices, cia402_table, machine_text
 from rds.bus.modules.cia402.configure import library, load
 from rds.bus.modules.cia402.first_motion import FirstMotion, first_motion
-from rds.bus.modules.cia402.identity import Identity, check_eds, identify, keep_eds, kept_eds, number, upload
+from rds.bus.modules.cia402.identity import Identity, answers, check_eds, identify, keep_eds, kept_eds, number, upload
 from rds.bus.modules.cia402.mapping import find_fixed, map_dynamically
 from rds.bus.modules.cia402.parameters import store
 from rds.bus.modules.cia402.settings import Command, DriveSettings, read_settings
@@ -147,12 +147,17 @@ def _recognize(
     """Identity and EDS."""
     network.send_message(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, options.node]))
     node = _bare(network, options.node)
-    if number(node, 0x1000) is None:
+    if not answers(node):
         raise MachineError(
             f"no device answers as node {options.node}; `rds scan` lists those that do, and `rds drive node-id` gives "
             "one to a drive that has none"
         )
     identity = identify(node)
+    if number(node, 0x6041) is None:
+        raise MachineError(
+            f"node {options.node} ({identity.name or 'without a name'}) is no CiA 402 drive: it has no statusword "
+            "(0x6041); `rds scan` lists what is on the bus"
+        )
     operator.say(str(identity))
     eds = options.eds or kept_eds(identity, folder)
     if eds is None:

@@ -62,6 +62,17 @@ def upload(node: canopen.RemoteNode, index: int, subindex: int = 0) -> bytes | N
         return None
 
 
+def answers(node: canopen.RemoteNode) -> bool:
+    """Whether a device is there; one that refuses to give its type answers, too."""
+    try:
+        node.sdo.upload(0x1000, 0)
+    except SdoAbortedError:
+        return True
+    except SdoCommunicationError:
+        return False
+    return True
+
+
 def number(node: canopen.RemoteNode, index: int, subindex: int = 0, signed: bool = False) -> int | None:
     """The value of an object that is a number; None if the drive does not give it."""
     data = upload(node, index, subindex)
