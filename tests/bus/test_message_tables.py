@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rds.bus import read_messages
+from rds.bus.analysis.message_tables import is_message_table
 from rds.cli.main import app
 from rds.core.errors import InputError
 
@@ -90,3 +91,8 @@ def test_a_table_that_will_not_do_is_told_by_its_line(tmp_path: Path, text: str,
 def test_options_of_machines_are_refused_for_tables(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["bus", "analyse", str(tmp_path / "car.dbc"), "--fits"])
     assert done.exit_code == 2 and "--fits is for a machine" in done.stderr
+
+
+def test_other_databases_are_converted_by_cantools() -> None:
+    with pytest.raises(InputError, match=r"convert it: `cantools convert car\.kcd car\.dbc`, and name car\.dbc"):
+        is_message_table(Path("car.kcd"))

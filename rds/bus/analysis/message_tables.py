@@ -11,6 +11,7 @@ from rds.bus.analysis.messages import Message
 from rds.core.errors import InputError
 
 ENDINGS = (".dbc", ".csv")
+CONVERTIBLE = (".kcd", ".sym", ".arxml")  # by cantools
 _NEEDED = ("identifier", "length")
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 _OF_TIME = ("period", "jitter", "deadline")
@@ -35,7 +36,10 @@ class MessageTable(NamedTuple):
 
 
 def is_message_table(path: Path) -> bool:
-    """Whether a file's name says that it is one."""
+    """Whether a file's name says that it is one. InputError for one that has to be converted."""
+    if path.suffix.lower() in CONVERTIBLE:
+        converted = path.with_suffix(".dbc").name
+        raise InputError(f"convert it: `cantools convert {path.name} {converted}`, and name {converted}", str(path))
     return path.suffix.lower() in ENDINGS
 
 
