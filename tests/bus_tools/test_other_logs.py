@@ -109,3 +109,22 @@ def test_what_candump_shows_without_directions(tmp_path: Path) -> None:
         (0x123, b"\x01\x02", False),
         (0x7DF, b"", True),
     ]
+
+
+def test_can_fd_frames_that_candump_shows_are_read(tmp_path: Path) -> None:
+    """Two digits of a length are those of CAN FD, four of CAN XL, which is counted."""
+    shown = " (1.5)  can0  RX B -  123  [12]  " + " ".join(f"{k:02X}" for k in range(12))
+    shown += "\n (1.6)  can0  TX - E  12345678  [08]  01 02 03 04 05 06 07 08\n (1.7)  can0  RX - -  124   [1]  FF\n"
+    shown += " (1.8)  can0  RX - -  125 [0002] (00|80:00:00000000) 01 02\n"
+    (tmp_path / "a.log").write_text(shown)
+    log = LogFile(tmp_path / "a.log")
+    first, second, classic = list(log)
+    assert first.is_fd and bytes(first.data) == bytes(range(12)) and first.bitrate_switch and first.is_rx
+    assert second.is_fd and len(second.data) == 8 and second.error_state_indicator and not second.bitrate_switch
+    assert not classic.is_fd and log.skipped == 1
+
+
+def test_a_can_fd_frame_that_is_cut_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(" (1.5)  can0  123  [12]  01 02 03\n")
+    with pytest.raises(InputError, match="3 bytes of data, and its length says 12"):
+        list(LogFile(tmp_path / "a.log"))

@@ -88,6 +88,7 @@ def test_name_and_unit_of_a_heading(cell: str, name: str, unit: str | None) -> N
         ("rate_rev_min", "rev/min"),
         ("position_mm", "mm"),
         ("time_s", "s"),
+        ("time_sec", "sec"),
         ("position_µm", "um"),
         ("state", None),
     ],

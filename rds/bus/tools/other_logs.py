@@ -22,7 +22,7 @@ _CRTD = re.compile(r"\d+\.\d+\s+\d*(?:[RT](?:11|29)|C[A-Z]{2})\b")
 _MICROCHIP = re.compile(r"\s*(?://-{3,}|Microchip Technology)")
 _BUSMASTER = re.compile(r"\*{3}BUSMASTER")
 _SHOWN = re.compile(
-    r"\s*\((?P<time>\d+\.\d+)\)\s+\S+\s+(?:(?P<way>RX|TX)\s+\S\s+\S\s+)?"
+    r"\s*\((?P<time>\d+\.\d+)\)\s+\S+\s+(?:(?P<way>RX|TX)\s+(?P<switched>\S)\s+(?P<passive>\S)\s+)?"
     r"(?P<id>[0-9A-F]{3}|[0-9A-F]{8})\s+\[(?P<size>\d+)\]"
 )
 _GVRET = re.compile(r"Time ?Stamp,\s*ID,\s*Extended,", re.IGNORECASE)
@@ -166,10 +166,14 @@ class _Candump:
             raise ValueError("no time in brackets, identifier and length")
         words = line[found.end() :].split()
         identifier, size = found["id"], int(found["size"])
-        if "ERRORFRAME" in words or len(found["size"]) > 1:
+        if "ERRORFRAME" in words or len(found["size"]) > 2:  # four digits: CAN XL
             return None
         remote = words[:1] == ["remote"]
         data = b"" if remote else bytes(int(word, 16) for word in words[:size])
-        return _message(
+        message = _message(
             float(found["time"]), int(identifier, 16), len(identifier) > 3, data, size, found["way"] != "TX", remote
         )
+        message.is_fd = len(found["size"]) == 2
+        message.bitrate_switch = message.is_fd and found["switched"] == "B"
+        message.error_state_indicator = message.is_fd and found["passive"] == "E"
+        return message

@@ -13,7 +13,7 @@ from rds.core.toml_text import toml_text
 from rds.identification.logs.map import SUFFIX, LogMap, TimeMap
 from rds.identification.logs.map_axis import DIMENSIONS, UNKNOWN, AxisMap, ColumnMap
 from rds.identification.logs.table import Column, Table, remedy
-from rds.identification.logs.units import dimension, known_units
+from rds.identification.logs.units import dimension, factor, known_units
 
 _DRIVING = frozenset(("torque", "force", "effort", "drehmoment", "kraft"))
 _VOLTAGES = frozenset(("voltage", "volt", "volts", "spannung", "motorspannung", "ankerspannung"))
@@ -196,13 +196,24 @@ def _why_no_time(column: Column) -> str:
     rows, steps = len(column.values), np.diff(column.values[np.isfinite(column.values)])
     if len(steps) and np.mean(steps < 0.0) >= _RISING:
         return f"{column.name!r} goes down from row to row; sort the rows by it, the oldest first"
-    if len(steps) and steps.min() == 0.0 and steps.max() > 0.0:
-        return (
+    if _is_coarse(column):
+        sentence = (
             f"{column.name!r} stays the same in {int(np.sum(steps == 0.0))} of {rows} rows: its stamps are coarser "
             "than the sample period; export it with more digits, or, if the rows are equally spaced in time, say so in "
-            "a map: rate = 1000.0 (Hz) under [time] in place of the column"
+            "a map: "
         )
+        if dimension(column.unit or "") != "time":
+            return sentence + "rate = 1000.0 (Hz) under [time] in place of the column"
+        there = column.values[np.isfinite(column.values)]
+        slope = float(np.polyfit(np.arange(len(there)), there, 1)[0]) * factor(str(column.unit), "s")
+        return sentence + f"rate = {1.0 / slope:.4g} (Hz, as its stamps go on the whole) under [time] in its place"
     return f"{column.name!r} does not increase from row to row ({rows} rows)"
+
+
+def _is_coarse(column: Column) -> bool:
+    """Whether the values go up, and stay the same between."""
+    steps = np.diff(column.values[np.isfinite(column.values)])
+    return len(steps) > 0 and float(steps.min()) == 0.0 and float(steps.max()) > 0.0
 
 
 def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
@@ -210,9 +221,11 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     units = {dimension(c.unit or "") for c in columns} | {"adc" for c in columns if c.name.endswith("_adc")}
     numbered = next((c.name for c in columns if c.name.lower() in _ORDINALS), None)
     sentence = f"{_NO_LOG}: "
-    if any(_role(c.name) == "time" for c in in_time):
-        column = next(c for c in in_time if _role(c.name) == "time")
-        return sentence + _why_no_time(column)
+    called = next((c for c in in_time if _role(c.name) == "time"), None)
+    if called is None and len(in_time) == 1 and _is_coarse(in_time[0]):
+        called = in_time[0]  # as an oscilloscope rounds it
+    if called is not None:
+        return sentence + _why_no_time(called)
     if in_time:
         names = ", ".join(c.name for c in in_time[:3]) + (" ..." if len(in_time) > 3 else "")
         sentence += f"its columns in s ({names}) are durations, and none increases from row to row"

@@ -88,6 +88,10 @@ def _as_vectors(of_class: str, name: str) -> str:
         return f"t = {name}.Time; y = {name}.Data; save('log.mat', 't', 'y')"
     if of_class == "timetable":
         return f"t = seconds({name}.Time - {name}.Time(1)); y = {name}.(1); save('log.mat', 't', 'y')"
+    if of_class == "iddata":
+        return (
+            f"t = {name}.SamplingInstants; u = {name}.InputData; y = {name}.OutputData; save('log.mat', 't', 'u', 'y')"
+        )
     if of_class == "table":
         return f"s = table2struct({name}, 'ToScalar', true); save('log.mat', 's')"
     return "t = ...; y = ...; save('log.mat', 't', 'y')"
