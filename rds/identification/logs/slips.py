@@ -18,12 +18,16 @@ _BESIDE = 3.0  # times what the steps before and after differ by
 _NEIGHBOURS = 4  # steps to each side
 _FEW = 20  # leaps, beyond which it is noise of an odd kind
 _TOLD = 3
+_RARE = 0.005  # of the samples: those of spikes at either side
+_LEAP = 0.25  # of the usual range of a speed, in one sample
 
 
 def leaps(log: Log, axis: Axis | None) -> list[Finding]:
-    """A finding with sample, time and size for the first leaps of the position; none for a log of a speed."""
-    if log.is_rate or len(log) < 50 * _NEIGHBOURS:
+    """A finding with sample, time and size for the first leaps of the position; of a speed, for its spikes."""
+    if len(log) < 50 * _NEIGHBOURS:
         return []
+    if log.is_rate:
+        return _spikes(log)
     rate = np.diff(log.position) / np.diff(log.time)
     curve = rate[1:-1] - 0.5 * (rate[:-2] + rate[2:])
     period = log.sample_period
@@ -46,6 +50,32 @@ def leaps(log: Log, axis: Axis | None) -> list[Finding]:
         "slip, or something jolt the axis? Split the log there, or leave that stretch out"
     )
     return [Finding("leap", what, Gravity.WARNING, found[0][0] + 1)]
+
+
+def _spikes(log: Log) -> list[Finding]:
+    """A speed that leaves its range for few samples, by a leap in one of them, under a command within its own range.
+
+    A drive's counter that wraps or loses counts makes such speeds, and a filter behind it draws them out.
+    """
+    speed, command = log.position, log.command
+    low, high = np.quantile(speed, [_RARE, 1.0 - _RARE])
+    range_ = float(high - low)
+    off = np.maximum(speed - high, low - speed) > range_
+    usual = (command >= np.quantile(command, _RARE)) & (command <= np.quantile(command, 1.0 - _RARE))
+    leaps = np.abs(np.diff(speed, prepend=speed[0])) > max(_LEAP * range_, _STEPS * (log.resolution or 0.0))
+    starts = np.flatnonzero(off[1:] & ~off[:-1]) + 1
+    found = [int(k) for k in starts if leaps[max(k - 1, 0) : k + 2].any() and usual[k]]
+    if range_ == 0.0 or not found:
+        return []
+    unit = log.units.get("position", "rev/min")
+    places = ", ".join(f"at {log.time[k]:.4g} s to {speed[k]:.4g}" for k in found[:_TOLD])
+    more = f" and {len(found) - _TOLD} times more" if len(found) > _TOLD else ""
+    what = (
+        f"the speed spikes {places} {unit}{more}, out of its usual range ({low:.4g} to {high:.4g} {unit}) and with "
+        "nothing in the command: did the encoder lose counts, or its counter begin again? Empty those cells, with "
+        'blanks = "drop" and gaps = "split" in the map'
+    )
+    return [Finding("leap", what, Gravity.WARNING, found[0])]
 
 
 def _outside(rate: np.ndarray, k: int) -> float:

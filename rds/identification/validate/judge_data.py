@@ -57,7 +57,7 @@ def of_data(a: Assessment, bands: Bands) -> Iterator[Reason]:
         yield Reason(
             Side.CANNOT_TELL,
             "no-excitation",
-            f"the command is {log.command[0]:.4g} V throughout: it excites no dynamics",
+            f"the command is {log.command[0]:.4g} {log.units.get('command', 'V')} throughout: it excites no dynamics",
         )
     if (disturbed := held(log)) is not None:  # of this log: it may be a part of another, which has moved
         yield Reason(Side.CANNOT_TELL, disturbed.kind, disturbed.what)
@@ -100,7 +100,7 @@ def of_upsets(a: Assessment) -> Iterator[Reason]:
     """Where in time the log does something else; the verdict is on the whole."""
     if a.free_run is None or a.motion == 0.0:
         return
-    for sentence in upsets(a.time, a.residual, a.noise, a.unit):
+    for sentence in upsets(a.time, a.residual, a.noise, a.unit, a.measured - a.residual):
         yield Reason(Side.NOTE, "upset", sentence)
 
 
