@@ -78,6 +78,11 @@ def test_a_coarse_speed_is_no_axis_that_hardly_moves() -> None:
     found = fit([log], structure("axis"), options={"fixed": {"friction_plus": FRICTION}})
     assert found.parameters["K"].value == pytest.approx(K, rel=0.03)
     assert found.parameters["tau"].value == pytest.approx(0.0265, rel=0.1)
+    fresh = speed_log(
+        np.repeat([0.0, 24.0, 12.0, 20.0, 0.0, 22.0], 400), step=38.5, tau=0.0265, period=0.001, name="fresh"
+    )
+    verdict = validate(found, fresh).verdict
+    assert verdict.ok, str(verdict)
     stands = speed_log(np.where(np.arange(2000) < 400, 0.0, 1.5), step=38.5, period=0.001)
     assert any("hardly moves" in finding.what for finding in stands.findings if finding.gravity is Gravity.FAULT)
 

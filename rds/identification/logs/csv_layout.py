@@ -299,8 +299,8 @@ def _of_tektronix(lines: Sequence[str], encoding: str) -> Layout | None:
 
 
 def _cut_heading(
-    lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int
-) -> tuple[Sequence[str], tuple[str, ...]]:
+    lines: list[str], first: int, delimiter: str, decimal: str, width: int
+) -> tuple[list[str], tuple[str, ...]]:
     """The lines with the heading as wide as the rows, where it is wider, and which of its cells that leaves out.
 
     LabVIEW heads a column of comments that has no cells, an oscilloscope those of start and step.
