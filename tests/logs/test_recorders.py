@@ -150,3 +150,52 @@ def test_a_time_that_an_oscilloscope_rounds_is_told_with_the_rate(tmp_path: Path
     assert "its stamps are coarser than the sample period" in problem and "rds report" not in problem
     rate = float(problem.split("rate = ")[1].split()[0])
     assert abs(rate - 25e3) < 250.0
+
+
+def test_what_a_terminal_saved_as_log_is_a_table(tmp_path: Path) -> None:
+    """PuTTY and Tera Term call .log what candump does; a log of frames begins its lines with a time in brackets."""
+    rows = "".join(f"{k};{U[k]:.3f};{X[k]:.4f}\r\n" for k in range(400))
+    table = read_table(saved(tmp_path / "teraterm.log", "t [ms];u [V];x [mm]\r\n" + rows))
+    assert [column.unit for column in table.columns.values()] == ["ms", "V", "mm"]
+    assert np.allclose(table.columns["x"].values, X, atol=1e-4)
+    with pytest.raises(InputError, match=r"no lines of numbers.*nor is it a log of frames") as caught:
+        read_table(saved(tmp_path / "boot.log", "Hello\nWorld\n"))
+    assert str(caught.value).count("boot.log") == 1
+    with pytest.raises(InputError, match="candump"):
+        read_table(saved(tmp_path / "can.log", "(1.5) can0 123#11\n(1.6) can0 12\n"))
+
+
+PUTTY = "=~=~=~=~=~=~=~=~=~= PuTTY log 2021.12.19 17:30:01 =~=~=~=~=~=~=\r\n\0\0\0\0rcent: 0.00%, RPM: 0\r\n"
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        (PUTTY, "PWM Percent: {u:.2f}%, Battery Voltage: 24.10V, RPM: {x:.3f}\r\n"),
+        ("", "PWM Percent:{u:.2f},Battery Voltage:24.10,RPM:{x:.3f}\n"),
+        ("ready\n", "PWM Percent={u:.2f}\tBattery Voltage=24.10\tRPM={x:.3f}\n"),
+    ],
+)
+@pytest.mark.parametrize("name", ["putty.log", "serial.txt"])
+def test_numbers_behind_labels_are_columns(name: str, head: str, row: str, tmp_path: Path) -> None:
+    text = head + "".join(row.format(u=U[k], x=X[k]) for k in range(400))
+    table = read_table(saved(tmp_path / name, text))
+    assert list(table.columns) == ["PWM Percent", "Battery Voltage", "RPM"]
+    assert np.allclose(table.columns["RPM"].values, X, atol=1e-3)
+    if head == PUTTY:
+        assert table.columns["Battery Voltage"].unit == "V"
+    assert ("passed over" in " ".join(finding.what for finding in table.findings)) == bool(head)
+
+
+def test_labels_that_change_from_line_to_line_are_refused(tmp_path: Path) -> None:
+    text = "speed: 1\n" * 60 + "speed: 1, pos: 2\n" * 60
+    with pytest.raises(InputError, match=r"60 of its 120 lines have other labels than speed.*one line for each sample"):
+        read_table(saved(tmp_path / "a.txt", text))
+
+
+def test_columns_in_spanish_and_portuguese_are_told(tmp_path: Path) -> None:
+    rows = "".join(f"{k / 50:.3f},{9.0 * U[k]:.2f},{X[k]:.3f}\n" for k in range(400))
+    for head in ("Tiempo (s), Voltaje (V), Velocidad (rad/s)", "Tempo (s), Tensao (V), Velocidade (rad/s)"):
+        found = guess(read_table(saved(tmp_path / "paso.csv", head + "\n" + rows)))
+        assert found.map is not None, found.problem
+        assert any(said.startswith("speed of axis is 'Veloc") for said in found.map.said)

@@ -15,36 +15,32 @@ from rds.identification.logs.map_axis import DIMENSIONS, UNKNOWN, AxisMap, Colum
 from rds.identification.logs.table import Column, Table, remedy
 from rds.identification.logs.units import dimension, factor, known_units
 
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
 _DRIVING = frozenset(("torque", "force", "effort", "drehmoment", "kraft"))
-_VOLTAGES = frozenset(("voltage", "volt", "volts", "spannung", "motorspannung", "ankerspannung"))
-_CURRENTS = frozenset(("current", "amps", "strom", "iststrom", "motorstrom", "ankerstrom", "i", "amperage"))
+_VOLTAGES = _words("voltage volt volts spannung motorspannung ankerspannung voltaje voltagem tensao tensione")
+_CURRENTS = _words("current amps strom iststrom motorstrom ankerstrom i amperage corrente corriente courant")
 _ACTS = _DRIVING | _VOLTAGES | {"current", "strom", "motorstrom", "ankerstrom"}
 # words of names, lower case, that tell a quantity; the first that fits
 _WORDS: Mapping[str, frozenset[str]] = {
-    "time": frozenset(("time", "t", "zeit", "timestamp", "timestamps", "elapsed", "seconds", "zeitstempel")),
-    "reference": frozenset(
-        ("reference", "ref", "setpoint", "set", "desired", "target", "commanded", "soll", "demand", "qg")
-    ).union(("sollposition", "lagesollwert", "solldrehzahl", "sollgeschwindigkeit", "drehzahlsollwert")),
-    "velocity": frozenset(
-        (
-            "velocity",
-            "velo",
-            "vel",
-            "speed",
-            "v",
-            "rate",
-            "geschwindigkeit",
-            "drehzahl",
-            "istdrehzahl",
-            "istgeschwindigkeit",
-            "drehzahlistwert",
-        )
+    "time": _words("time t zeit timestamp timestamps elapsed seconds zeitstempel tempo tiempo"),
+    "reference": _words(
+        "reference ref setpoint set desired target commanded soll demand qg sollposition lagesollwert solldrehzahl "
+        "sollgeschwindigkeit drehzahlsollwert referencia consigna consigne riferimento"
+    ),
+    "velocity": _words(
+        "velocity velo vel speed v rate geschwindigkeit drehzahl istdrehzahl istgeschwindigkeit drehzahlistwert "
+        "velocidade velocidad vitesse velocita"
     ),
     "current": _CURRENTS,
     "command": frozenset(("command", "cmd", "u", "input", "control", "vir")).union(_DRIVING, _VOLTAGES),
-    "position": frozenset(
-        ("measured", "position", "pos", "encoder", "enc", "y", "x", "q", "qm", "ist", "output", "angle", "counts")
-    ).union(("feedback", "actual", "act", "istposition", "lageistwert", "lage")),
+    "position": _words(
+        "measured position pos encoder enc y x q qm ist output angle counts feedback actual act istposition "
+        "lageistwert lage posicao posicion posizione salida"
+    ),
 }
 # never what was measured
 _OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration", "accel", "acc"))
@@ -82,7 +78,7 @@ def guess(table: Table) -> Guess:
             doubts.append(f"{name}: {doubt}" if len(groups) > 1 else doubt)
             continue
         axes[name] = AxisMap(name, {q: ColumnMap(c.name, place="the guessed map") for q, c in found.items()})
-        said += [f"{q} of {name} is {c.name!r} [{c.unit}]" for q, c in found.items()]
+        said += [f"{_called(q, c)} of {name} is {c.name!r} [{c.unit}]" for q, c in found.items()]
     strange = [c for c in table.columns.values() if _is_strange(c)]
     said += [f"{c.name!r} is not used, as its unit {c.unit!r} is unknown" for c in strange]
     if doubts or not axes:
@@ -92,6 +88,11 @@ def guess(table: Table) -> Guess:
                 return Guess(None, spoiled, is_log=False)
         return Guess(None, "; ".join(doubts) or "no column tells a command and a position by its name and unit")
     return Guess(LogMap(TimeMap(time, place="the guessed map"), axes, said=tuple(said)), "")
+
+
+def _called(quantity: str, column: Column) -> str:
+    """What a guess calls a quantity: a position that is a speed, as a spindle's, is called one."""
+    return "speed" if quantity == "position" and dimension(column.unit or "") == "angular speed" else quantity
 
 
 def draft(table: Table) -> str:

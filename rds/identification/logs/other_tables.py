@@ -47,7 +47,10 @@ def read_mat(path: Path) -> Table:
     others = [f"{name} ({len(values)})" for name, values in vectors.items() if len(values) != length]
     findings = []
     if others:
-        what = f"left out, as they do not have {length} values like the others: {', '.join(others)}"
+        what = (
+            f"left out, as they do not have {length} values like the others: {', '.join(others)}; where they belong to "
+            "the log, put them on its times in MATLAB, as in y = interp1(t2, y2, t), or save them as a second file"
+        )
         findings.append(Finding("columns", what))
     if left_out:
         findings.append(Finding("columns", f"left out, as they hold no real numbers: {', '.join(left_out)}"))

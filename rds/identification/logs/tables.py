@@ -64,7 +64,7 @@ def read_table(
         raise InputError("it is a folder; name the file of data in it", str(path))
     if not path.is_file():
         raise InputError("there is no such file; check the name and the folder", str(path))
-    from rds.identification.logs import codesys_table, halscope_table, mf4_channels
+    from rds.identification.logs import codesys_table, halscope_table, labelled_table, mf4_channels
 
     ending = path.suffix.lower()
     try:
@@ -72,6 +72,16 @@ def read_table(
             table = mf4_channels.read_channels(path)
         elif ending in (*TEXTS, ".log") and halscope_table.is_halscope(path):
             table = halscope_table.read_halscope(path)
+        elif ending in (*TEXTS, ".log") and labelled_table.is_labelled(path):
+            table = labelled_table.read_labelled(path)
+        elif ending == ".log" and not dbc and not _is_of_frames(path):
+            from rds.identification.logs.csv_table import read_csv
+
+            try:
+                table = read_csv(path, delimiter, decimal, progress)  # what a terminal has saved
+            except InputError as error:
+                what = str(error).removeprefix(f"{error.where}: ")
+                raise InputError(f"{what}; nor is it a log of frames, as `candump -L` writes", error.where) from error
         elif ending == ".mdf":
             raise InputError("it is no MDF file with measurements; let the name of a bus log end in .mf4")
         elif ending in BUSES or ending == ".gz" or (ending in TEXTS and _is_bus_csv(path)):
@@ -102,6 +112,12 @@ def read_table(
     except OSError as error:
         reason = error.strerror or f"{error}; it is cut or damaged: take another copy"
         raise InputError(f"it cannot be read: {reason}", str(path)) from error
+
+
+def _is_of_frames(path: Path) -> bool:
+    from rds.bus.tools.logs import is_of_frames
+
+    return is_of_frames(path)
 
 
 def _is_bus_csv(path: Path) -> bool:
