@@ -10,6 +10,8 @@ from rds.identification.fit.upsets import upsets
 from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import Finding, Gravity, Log
 from rds.identification.structures.structures import structure
+from rds.identification.validate.candidate import Candidate
+from rds.identification.validate.discrepancy import as_axis
 from rds.identification.validate.validate import validate
 
 T, TAU, K, FRICTION = 0.005, 0.08, 22.0, 15.0  # s, s, (rev/min)/V, rev/min
@@ -113,6 +115,10 @@ def test_spikes_of_a_speed_are_told_with_their_times() -> None:
     with_spikes = with_findings(Log("spikes", log.time, log.command, spiked, units=log.units))
     (found,) = said(with_spikes, "leap")
     assert "at 6.555 s" in found.what and "at 19.66 s" in found.what and found.gravity is Gravity.WARNING
+    lost = log.position.copy()
+    lost[[0, 1266]] = 3000.0, 0.0  # before the first difference, and where one is missing
+    (found,) = said(with_findings(Log("lost", log.time, log.command, lost, units=log.units)), "leap")
+    assert "at 0 s to 3000, at 6.33 s to 0 rev/min" in found.what
 
 
 @pytest.mark.parametrize("kind", ["pulse", "steps", "noise"])
@@ -146,3 +152,23 @@ def test_a_model_that_is_too_slow_sees_no_slip_of_the_encoder() -> None:
     slipped = late + 120.0 * (t >= 6.0)
     assert not any("leaps by" in sentence for sentence in upsets(t, late, 0.2, "deg", y - late))
     assert any("at 6 s the measurement leaps by" in sentence for sentence in upsets(t, slipped, 0.2, "deg", y - late))
+
+
+def test_a_flywheel_s_gain_at_rest_is_not_told_by_a_log_that_never_comes_to_rest() -> None:
+    """Of a time constant of many swings only its ratio to the gain is known, however sure a slope looks."""
+    made = structure("axis", output="rev/min")
+    draw = np.random.default_rng(1)
+    t = np.arange(3000) * 0.01
+    u = np.repeat(draw.uniform(-0.8, 0.8, 30), 100)
+    truth = {"tau": 300.0, "K": 54e3, "friction_plus": 1500.0, "friction_minus": -1500.0}
+    y = made.respond(t, u, (0.0,), truth) + 0.3 * draw.standard_normal(len(t)) + 8.0 * np.sin(0.4 * t)
+    units = {"position": "rev/min", "command": "V"}
+    log = Log("flywheel", t, u, y, units=units, closed_loop=False)
+    model = {
+        "tau": 11.0,
+        "K": 1980.0,
+        "friction_plus": 55.0,
+        "friction_minus": -55.0,
+    }  # the same gain over time constant
+    found = as_axis(Candidate("model", made, model), log, 0.3)
+    assert found is not None and not (found.gain.at == 0.0 and abs(found.gain.value) > 3.5 * found.gain.error)
