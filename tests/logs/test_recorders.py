@@ -199,3 +199,10 @@ def test_columns_in_spanish_and_portuguese_are_told(tmp_path: Path) -> None:
         found = guess(read_table(saved(tmp_path / "paso.csv", head + "\n" + rows)))
         assert found.map is not None, found.problem
         assert any(said.startswith("speed of axis is 'Veloc") for said in found.map.said)
+
+
+def test_channels_that_are_called_by_numbers_keep_them(tmp_path: Path) -> None:
+    rows = "".join(f"{k / 1e3:.5E},{U[k]:+.5E},{X[k]:+.5E}\n" for k in range(400))
+    table = read_table(saved(tmp_path / "scope_1.csv", "x-axis,1,2\nsecond,Volt,Volt\n" + rows))
+    assert list(table.columns) == ["x-axis", "1", "2"] and table.columns["2"].unit == "Volt"
+    assert np.allclose(table.columns["2"].values, X, atol=1e-4)

@@ -313,7 +313,12 @@ def _cut_heading(
     below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
     ended = bool(below) and all(row[-1] == "" for row in below)
     own, surplus = cells[: width - ended], cells[width - ended :]
-    if not surplus or not all(own) or len(set(cells)) < len(cells) or any(is_number(cell, decimal) for cell in cells):
+    if (
+        len(cells) <= width
+        or not all(own)
+        or len(set(cells)) < len(cells)
+        or any(is_number(cell, decimal) for cell in cells)
+    ):
         return lines, ()
     found = [f'"{cell}"' if delimiter in cell else cell for cell in own]
     return [*lines[: first - 1], delimiter.join(found), *lines[first:]], tuple(surplus)
@@ -338,10 +343,11 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
         rows = [found or _heading_cells(line, delimiter, width) for found, line in zip(rows, above, strict=True)]
     units: list[str | None] = [None] * width
     heads = rows[-1] if rows else None
-    if heads is not None and _are_units(heads) and len(rows) > 1 and rows[-2] is not None:
+    above_units = heads is not None and _are_units(heads) and len(rows) > 1 and rows[-2] is not None
+    if heads is not None and above_units:
         units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
         heads = rows[-2]
-    if heads is None or any(is_number(cell, decimal) for cell in heads):
+    if heads is None or (any(is_number(cell, decimal) for cell in heads) and not above_units):
         return Headings(tuple(f"column {i + 1}" for i in range(width)), tuple(units))
     names = []
     for i, cell in enumerate(heads):
