@@ -156,3 +156,18 @@ def test_candump_without_times_is_told_how_to_record_them(name: str, tmp_path: P
     (tmp_path / name).write_text("  vcan0  0C8   [8]  F0 00 00 00 00 00 00 00\n")
     with pytest.raises(InputError, match="no times; record with `candump -L`"):
         list(LogFile(tmp_path / name))
+
+
+def test_can_xl_that_candump_shows_is_counted(tmp_path: Path) -> None:
+    """Two digits of a length are those of CAN FD, four of CAN XL."""
+    shown = " (1.7)  can0  RX - -  124   [1]  FF\n (1.8)  can0  RX - -  125 [0002] (00|80:00:00000000) 01 02\n"
+    (tmp_path / "a.log").write_text(shown)
+    log = LogFile(tmp_path / "a.log")
+    (classic,) = list(log)
+    assert not classic.is_fd and log.skipped == 1
+
+
+def test_a_can_fd_frame_that_is_cut_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(" (1.5)  can0  123  [12]  01 02 03\n")
+    with pytest.raises(InputError, match="3 bytes of data, and its length says 12"):
+        list(LogFile(tmp_path / "a.log"))

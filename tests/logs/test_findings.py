@@ -254,7 +254,7 @@ def rows(time: str, command: str, position: str, count: int = 200) -> str:
         (rows("{m}", "{j}", "{k}"), r"'time' goes down from row to row; sort the rows by it, the oldest first"),
         (
             rows("{c}", "{j}", "{k}"),
-            r"'time' stays the same in 180 of 200 rows: .* rate = 1000\.0 \(Hz\) under \[time\]",
+            r"'time' stays the same in 180 of 200 rows: .* rate = [\d.]+ \(Hz, as its stamps go",
         ),
         (rows("1", "{j}", "{k}"), r"'time' does not increase from row to row \(200 rows\)"),
         (rows("{i}", "{j}", "nan"), "position has no number in 200 of 200 samples"),

@@ -52,7 +52,8 @@ def test_mat_vectors_structs_matrices_and_constants(tmp_path: Path) -> None:
     assert np.array_equal(log.position, made["position"]) and np.array_equal(log.command, made["voltage"])
     assert log.force_gain == 35.0
     assert {f.what for f in log.findings if f.kind == "columns"} == {
-        "left out, as they do not have 4000 values like the others: other (2)",
+        "left out, as they do not have 4000 values like the others: other (2); where they belong to the log, put them "
+        "on its times in MATLAB, as in y = interp1(t2, y2, t), or save them as a second file",
         "left out, as they hold no real numbers: who",
     }
 

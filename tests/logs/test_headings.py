@@ -88,6 +88,7 @@ def test_name_and_unit_of_a_heading(cell: str, name: str, unit: str | None) -> N
         ("rate_rev_min", "rev/min"),
         ("position_mm", "mm"),
         ("time_s", "s"),
+        ("time_sec", "sec"),
         ("position_µm", "um"),
         ("state", None),
     ],
@@ -189,6 +190,7 @@ def test_channels_of_a_scope_end_one_after_another(tmp_path: Path) -> None:
     [
         ("X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-2.0e-01,1.0e-03\n", "{k},{u},{x},", -0.2),
         ("Time,X(CH1),X(CH2)\nSecond,Volt,Volt\n", "{t},{u},{x}", 0.0),
+        ("x-axis,CH1,CH2\nsecond,Volt,Volt\n", "{t},{u},{x}", 0.0),
         ("Record Length,Analog:400\nSource,CH1,CH2\nSecond,Volt,Volt\n", "{t},{u},{x}", 0.0),
     ],
 )

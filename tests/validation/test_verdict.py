@@ -19,10 +19,11 @@ from rds.identification.logs.log import Finding, Gravity
 from rds.identification.structures.structures import structure
 from rds.identification.validate.assessment import assess
 from rds.identification.validate.candidate import as_candidate
+from rds.identification.validate.conclusion import overall
 from rds.identification.validate.judge import judge
 from rds.identification.validate.same_data import overlap
 from rds.identification.validate.validate import Validation, validate
-from rds.identification.validate.verdict import Bands, Side, Word
+from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
 from tests.validation.validation_logs import STEP, T, X, candidate, log, moved, square
 
 FRESH = square(8.0, 3.0, 0.7)
@@ -369,3 +370,11 @@ def test_logs_of_two_axes_contradict_each_other(estimated: bool) -> None:
     assert "The logs contradict each other." in found.verdict.sentence
     alike = validate(model, [log(FRESH, name="a"), log(FRESH, name="b")])
     assert not any(r.kind == "contradiction" for r in alike.verdict.reasons)
+
+
+def test_a_reason_that_logs_share_is_given_once_with_their_names() -> None:
+    shared = Reason(Side.AGAINST, "fit", "the fit warned of it")
+    own = Reason(Side.FOR, "voltage", "the voltage is 2 % off")
+    verdicts = {name: Verdict(Word.PARTLY, name, (shared, own) if name == "a" else (shared,)) for name in "abcdef"}
+    given = [reason.what for reason in overall(verdicts).reasons]
+    assert given == ["a, b, c, d and 2 more: the fit warned of it", "a: the voltage is 2 % off"]

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import gzip
 import math
+import re
 import sqlite3
 import struct
 import zlib
@@ -45,6 +46,8 @@ from rds.core.private_files import open_private
 _OTHERS = (".txt", ".crtd", ".can")  # read only
 ENDINGS = (".asc", ".blf", ".log", ".trc", ".csv", ".db", ".mf4")
 _READERS = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader, ".csv": can.CSVReader}
+_LOOKED_AT = 1 << 14  # characters
+_FRAME = re.compile(r"(?m)^\s*\(\d+\.\d+\)\s")
 _DAMAGE = (
     ValueError,
     IndexError,
@@ -71,6 +74,15 @@ def ending(path: Path) -> tuple[str, bool]:
             str(path),
         )
     return suffix, packed
+
+
+def is_of_frames(path: Path) -> bool:
+    """Whether a text is a log of frames, be it damaged: its lines begin with a time in brackets, or it is another's.
+
+    A terminal calls what it has saved .log, too.
+    """
+    with path.open(encoding="utf-8", errors="replace") as text:
+        return kind_of(text) is not None or _FRAME.search(text.read(_LOOKED_AT)) is not None
 
 
 # --- reading

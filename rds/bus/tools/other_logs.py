@@ -23,7 +23,7 @@ _CRTD = re.compile(r"\d+\.\d+\s+\d*(?:[RT](?:11|29)|C[A-Z]{2})\b")
 _MICROCHIP = re.compile(r"\s*(?://-{3,}|Microchip Technology)")
 _BUSMASTER = re.compile(r"\*{3}BUSMASTER")
 _SHOWN_FRAME = (
-    r"\S+\s+(?:(?P<way>RX|TX)\s+(?P<fast>\S)\s+(?P<passive>\S)\s+)?"
+    r"\S+\s+(?:(?P<way>RX|TX)\s+(?P<switched>\S)\s+(?P<passive>\S)\s+)?"
     r"(?P<id>[0-9A-F]{3}|[0-9A-F]{8})\s+\[(?P<size>\d+)\]"
 )
 _SHOWN = re.compile(rf"\s*\((?:(?P<time>\d+\.\d+)|(?P<date>\d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+))\)\s+{_SHOWN_FRAME}")
@@ -186,7 +186,7 @@ class _Candump:
             raise ValueError("no time in brackets, identifier and length")
         words = line[found.end() :].split()
         identifier, size = found["id"], int(found["size"])
-        if "ERRORFRAME" in words:
+        if "ERRORFRAME" in words or len(found["size"]) > 2:  # four digits: CAN XL
             return None
         remote = words[:1] == ["remote"]
         data = b"" if remote else bytes(int(word, 16) for word in words[:size])
@@ -195,6 +195,7 @@ class _Candump:
             raise ValueError("its time goes back: `candump -t d` writes the distance to the frame before; use -t a")
         self._times = [*self._times[:1], stamp]
         message = _message(stamp, int(identifier, 16), len(identifier) > 3, data, size, found["way"] != "TX", remote)
-        message.is_fd = len(found["size"]) > 1
-        message.bitrate_switch, message.error_state_indicator = found["fast"] == "B", found["passive"] == "E"
+        message.is_fd = len(found["size"]) == 2
+        message.bitrate_switch = message.is_fd and found["switched"] == "B"
+        message.error_state_indicator = message.is_fd and found["passive"] == "E"
         return message

@@ -28,8 +28,13 @@ def contradictions(problem: Problem, solution: Solution) -> Iterator[str]:
         return
     alone = [_alone(problem, solution, number) for number in range(len(problem.logs))]
     for at, name in enumerate(problem.names):
-        size = abs(problem.values(solution.point)[name])
-        known = [(i, value[at], error[at]) for i, (value, error) in enumerate(alone) if error[at] <= _SURE * size]
+        both_say = problem.values(solution.point)[name]
+        size = abs(both_say)
+        known = [
+            (i, value[at], error[at])
+            for i, (value, error) in enumerate(alone)
+            if error[at] <= _SURE * size and abs(value[at] - both_say) <= size  # farther no linear step goes
+        ]
         pairs = [
             (abs(a - b) / spread, (i, a), (j, b))
             for (i, a, ea), (j, b, eb) in combinations(known, 2)

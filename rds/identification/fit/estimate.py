@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isinf
 from typing import Any
 
 import numpy as np
 
+_NAMED = 4  # logs that a sentence names
 UNUSABLE = "do not use these parameters"  # how a warning begins that leaves nothing to believe in
 
 
@@ -118,3 +119,9 @@ class Estimate:
         from rds.identification.fit.fit_report import fragment
 
         return fragment(self)
+
+
+def names_of(names: Sequence[str]) -> str:
+    """Names of logs, the first ones of many."""
+    named = ", ".join(dict.fromkeys(names[:_NAMED]))
+    return f"{named} and {len(names) - _NAMED} more" if len(names) > _NAMED else named

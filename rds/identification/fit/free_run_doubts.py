@@ -11,6 +11,7 @@ import numpy as np
 from rds.identification.fit.estimate import UNUSABLE, Errors
 from rds.identification.fit.kstep import over_noise
 from rds.identification.fit.smoothing import Motion, motion_of
+from rds.identification.logs.excitation import is_steady
 from rds.identification.logs.log import RATES
 from rds.identification.logs.motion import travel
 from rds.identification.structures.structure import Structure
@@ -105,8 +106,8 @@ def _too_small(log: Log, way: str, reach: float, how: str, noise: float, unit: s
 def _poor(log: Log, motion: Motion, error: np.ndarray, is_open: bool = True) -> list[str]:
     spread = float(log.position.std())
     fit = 100.0 * (1.0 - float(error.std()) / spread) if spread > 0.0 else 0.0
-    if not (fit < _POOR and _rms(error) > MISSED * motion.noise):
-        return []
+    if not (fit < _POOR and _rms(error) > MISSED * motion.noise) or (log.is_rate and is_steady(log)):
+        return []  # a speed that stays the same has no motion to explain
     verdict = (
         UNUSABLE if is_open else "unless a controller held it (closed_loop in the map), they are not the axis's own"
     )

@@ -12,10 +12,11 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
-from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
+from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, names_of, said_of_guesses
 from rds.identification.fit.free_run_doubts import held_doubts, other_doubts
 from rds.identification.fit.initial_state import estimate_start, initial_samples
 from rds.identification.fit.kstep import ahead, errors_of
+from rds.identification.logs.excitation import is_steady
 from rds.identification.logs.fingerprint import fingerprint
 from rds.identification.logs.log import Gravity, Log
 from rds.identification.logs.motor_constant import UNKNOWN
@@ -71,15 +72,7 @@ def made_estimate(
             )
     notes += dict.fromkeys(f.what for log in logs for f in log.findings if f.kind == UNKNOWN)
     begun, free_run, predictions = {}, {}, {}
-    said = [
-        f"{UNUSABLE}: {log.name}: {finding.what}"
-        for log in logs
-        for finding in log.findings
-        if finding.gravity is Gravity.FAULT
-    ]
-    said += [
-        f"{log.name}: {finding.what}" for log in logs for finding in log.findings if finding.gravity is Gravity.WARNING
-    ]
+    said = _of_logs(logs)
     said += [*said_of_guesses(parameters), *_too_slow(logs, parameters, method), *warnings]
     if _none_told(parameters) and not any(UNUSABLE in sentence for sentence in said):
         said.append(
@@ -115,6 +108,25 @@ def made_estimate(
         output_unit=structure.output_unit,
         command_unit=structure.command_unit,
     )
+
+
+def _of_logs(logs: Sequence[Log]) -> list[str]:
+    """Faults and warnings about the logs, each once with the names of those that have it.
+
+    A log of a steady speed, which tells nothing by itself, is no fault beside others that have none.
+    """
+    are_whole = any(all(finding.gravity is not Gravity.FAULT for finding in log.findings) for log in logs)
+    faults: dict[str, list[str]] = {}
+    warned: dict[str, list[str]] = {}
+    for log in logs:
+        for finding in log.findings:
+            is_fault = finding.gravity is Gravity.FAULT
+            if is_fault and not (are_whole and finding.kind == "excitation" and is_steady(log)):
+                faults.setdefault(finding.what, []).append(log.name)
+            elif is_fault or finding.gravity is Gravity.WARNING:
+                warned.setdefault(finding.what, []).append(log.name)
+    said = [f"{UNUSABLE}: {names_of(names)}: {what}" for what, names in faults.items()]
+    return said + [f"{names_of(names)}: {what}" for what, names in warned.items()]
 
 
 def _too_slow(logs: Sequence[Log], parameters: Mapping[str, Parameter], method: str) -> list[str]:

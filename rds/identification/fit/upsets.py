@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from rds.identification.logs.log import RATES
+
 _BLOCKS = 200  # that a log is cut into, at most
 _LEAST = 20  # blocks; samples of one
 _STEP = 12.0  # robust standard deviations of the steps between blocks, and times the noise
@@ -17,10 +19,16 @@ _OTHER = 3.0  # times the usual size of steps
 _RUN = 4  # blocks of a regime, at least
 _MOST = 0.4  # of the log: a regime is the exception
 _TOLD = 3  # of each kind
+_WITHIN, _SUDDEN = 4, 0.5  # samples to either side, within which a leap makes so much of its way
+_ALL = 0.8  # of the squares of a model's accelerations
 
 
-def upsets(time: np.ndarray, error: np.ndarray, noise: float, unit: str) -> list[str]:
-    """Sentences on where `error` (samples,), measured minus modelled, steps or wanders; `noise` is its floor."""
+def upsets(time: np.ndarray, error: np.ndarray, noise: float, unit: str, modelled: np.ndarray) -> list[str]:
+    """Sentences on where `error` (samples,), measured minus `modelled`, steps or wanders; `noise` is its floor.
+
+    A stretch that holds nearly all accelerations of the model is none of another regime: elsewhere it has nothing to be
+    wrong in.
+    """
     width = max(len(error) // _BLOCKS, _LEAST)
     count = len(error) // width
     if count < _LEAST or not np.isfinite(error).all():
@@ -33,24 +41,46 @@ def upsets(time: np.ndarray, error: np.ndarray, noise: float, unit: str) -> list
     if usual == 0.0:
         return []
     size = np.abs(steps - np.median(steps))
-    found = _regimes(size, usual, starts, unit)
+    found = [
+        regime
+        for regime in _regimes(size, usual, starts, unit)
+        if not _holds_all(modelled[: count * width].reshape(count, width).mean(axis=1), regime, unit)
+    ]
     inside = np.zeros(len(steps), dtype=bool)
     for first, end, _ in found:
         inside[first:end] = True
     leaps = np.flatnonzero((size > _STEP * usual) & (np.abs(steps) > _STEP * noise) & ~inside)
     leaps = leaps[leaps > 1]  # at the begin, the initial state makes up for what it can
     leaps = leaps[np.diff(leaps, prepend=-9) > 1]  # a step in a block's middle counts once
-    said = [_leap(time, error, int(k), width, unit) for k in leaps[:_TOLD]] if len(leaps) <= count // 20 else []
+    told = [_leap(time, error, int(k), width, unit, modelled) for k in leaps] if len(leaps) <= count // 20 else []
+    said = [sentence for sentence in told if sentence][:_TOLD]
     return [*said, *(sentence for _, _, sentence in found[:_TOLD])]
 
 
-def _leap(time: np.ndarray, error: np.ndarray, block: int, width: int, unit: str) -> str:
+def _holds_all(modelled: np.ndarray, regime: tuple[int, int, str], unit: str) -> bool:
+    """Whether the model's accelerations, by means over blocks, are nearly all within a regime, or next to it."""
+    speed = modelled if unit in RATES else np.diff(modelled, prepend=modelled[0])
+    changes = np.diff(speed) ** 2
+    first, end, _ = regime
+    return float(changes[max(first - 2, 0) : end + 2].sum()) > _ALL * float(changes.sum())
+
+
+def _leap(time: np.ndarray, error: np.ndarray, block: int, width: int, unit: str, modelled: np.ndarray) -> str:
+    """The sentence on a leap; "" where the error goes there by degrees, as beside a model that is late or too slow, or
+    where a speed is to leap.
+    """
     part = slice(block * width, min((block + 2) * width, len(error)))
     jumps = np.abs(np.diff(error[part]))
     at = part.start + 1 + int(np.argmax(jumps))
     before, after = error[max(at - width, 0) : at], error[at : at + width]
+    size = float(np.median(after) - np.median(before))
+    first, last = max(at - 1 - _WITHIN, 0), min(at + _WITHIN, len(error) - 1)
+    if abs(float(error[last] - error[first])) < _SUDDEN * abs(size):
+        return ""
+    if unit in RATES and abs(float(modelled[last] - modelled[first])) > _SUDDEN * abs(size):
+        return ""
     return (
-        f"at {time[at]:.4g} s the measurement leaps by {np.median(after) - np.median(before):+.3g} {unit} beside the "
+        f"at {time[at]:.4g} s the measurement leaps by {size:+.3g} {unit} beside the "
         "model: did the encoder slip, or something jolt the axis?"
     )
 

@@ -20,6 +20,7 @@ from rds.results.units import split_heading
 
 _FEW = 20  # rows of data that are looked at for how they end
 HEAD = 1 << 16  # bytes looked at
+_SETTINGS = 40  # lines beside which an oscilloscope says how it was set
 COMMENTS = ("#", "%", "//", "!")
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
 BLANKS = frozenset(("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "+inf"))
@@ -49,6 +50,8 @@ class Layout:
     counted: tuple[float, float] | None = None  # the first column is a number of the sample: time of the first, step
     passed: str = ""  # a line above the data that has numbers in it, too
     scaled: tuple[str, ...] = ()  # channels of which nothing tells whether their numbers are scaled
+    beside: int = 0  # columns at the left that hold the recorder's settings beside the samples
+    surplus: tuple[str, ...] = ()  # headings below which no cells stand
 
 
 def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
@@ -65,17 +68,26 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
             # more numbers is better; then the delimiter that comes first in the table, then the decimal point
             if score and (best is None or score > best[0]):
                 best = (score, width, mark, point, first)
+    if (beside := _of_tektronix(lines, encoding)) is not None:
+        return beside
     if best is None:
         shown = next((line for line in lines if line.strip()), "")
         remedy = "it needs columns of numbers, separated by commas, semicolons, tabs, bars or spaces"
         if quoted and decimal is None:
             remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
+        if any(_are_numbers(line.split(":")) for line in lines):
+            remedy += "; its cells seem to stand between colons: export it with semicolons between them"
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
     _, width, mark, point, first = best
+    if mark == " " and labelled_headings(lines[:first], str.split) is not None:
+        what = "its channels are headed by labels, and blanks stand between its cells, so that an empty one is lost"
+        raise InputError(f"{what}; export it with semicolons between them (TwinCAT's scope asks for that)", str(path))
     found_heads = labelled_headings(lines[:first], lambda line: split(line, mark)) if mark != " " else None
     labelled = found_heads is not None
+    surplus: tuple[str, ...] = ()
     if found_heads is None:
         first = _with_faulty_rows(lines, first, mark, point, width)
+        lines, surplus = _cut_heading(lines, first, mark, point, width)
         found_heads = _headings(lines, first, mark, point, width)
     names, units, times, scaled = found_heads
     width = len(names)
@@ -116,6 +128,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         counted,
         passed,
         scaled,
+        surplus=surplus,
     )
 
 
@@ -148,6 +161,19 @@ def is_number(cell: str, decimal: str) -> bool:
     return cell.lower() not in BLANKS and "_" not in cell
 
 
+def in_rows(what: str, path: Path) -> InputError:
+    """The error that the signals of a table stand in rows, as NumPy writes an array of (signals, samples)."""
+    return InputError(
+        f"{what}: its signals stand in rows, as it seems, and a sample in a column; turn the table round, in Python by "
+        "`numpy.savetxt('log.csv', numpy.loadtxt(FILE, delimiter=',').T, delimiter=',', header='t [s],u [V],y [mm]')`",
+        str(path),
+    )
+
+
+def _are_numbers(cells: Sequence[str]) -> bool:
+    return len(cells) > 1 and all(is_number(cell.strip(), ",") or is_number(cell.strip(), ".") for cell in cells)
+
+
 def is_comment(line: str) -> bool:
     """Whether a line is a remark, and not a row."""
     return line.lstrip().startswith(COMMENTS)
@@ -173,6 +199,8 @@ def _head(path: Path) -> tuple[list[str], str]:
         encoding, text = "cp1252", data.decode("cp1252", errors="replace")
     if "\r" in text and "\n" not in text:
         raise InputError("its lines end in a carriage return alone, as on old Macs; save it with line feeds", str(path))
+    if not whole and "\n" not in text:
+        raise in_rows(f"its first line has more than {HEAD} bytes", path)
     # not splitlines(): a form feed ends no line for the reader of the rows
     lines = [line.rstrip("\r") for line in text.removeprefix("\ufeff").split("\n")]
     return (lines if whole or len(lines) < 2 else lines[:-1]), encoding
@@ -241,6 +269,61 @@ def _of_rigol(
     return ("time", *channels, *names[found:]), ("s", *own[: len(channels)], *units[found:]), counted
 
 
+def _of_tektronix(lines: Sequence[str], encoding: str) -> Layout | None:
+    """The layout of a channel that a TDS or TBS oscilloscope saved, its settings beside the first samples.
+
+    Record Length,2.500000e+03,,  -0.0125,  -3.60,
+    Sample Interval,1.000000e-05,,  -0.01249,  -3.58,
+    """
+    rows = [split(line, ",") for line in lines[:_SETTINGS]]
+    if not rows or rows[0][:1] != ["Record Length"] or len(rows[0]) < 5 or not is_number(rows[0][1], "."):
+        return None
+    settings = {row[0]: row[1] for row in rows if len(row) > 1 and row[0]}
+    first = next((n for n, row in enumerate(rows) if all(is_number(cell, ".") for cell in row[3:5])), None)
+    if first is None:
+        return None
+    width = len(rows[0])
+    names = [
+        "setting",
+        "value",
+        "blank",
+        "time",
+        settings.get("Source", "channel"),
+        *(f"column {i + 1}" for i in range(5, width)),
+    ]
+    units: list[str | None] = [None] * width
+    units[3:5] = settings.get("Horizontal Units") or None, settings.get("Vertical Units") or None
+    announced = int(float(settings["Record Length"]))
+    words = frozenset((0, 1))
+    return Layout(encoding, ",", ".", first, tuple(names), tuple(units), words, {}, announced, beside=3)
+
+
+def _cut_heading(
+    lines: list[str], first: int, delimiter: str, decimal: str, width: int
+) -> tuple[list[str], tuple[str, ...]]:
+    """The lines with the heading as wide as the rows, where it is wider, and which of its cells that leaves out.
+
+    LabVIEW heads a column of comments that has no cells, an oscilloscope those of start and step.
+    """
+    if first == 0 or delimiter == " ":
+        return lines, ()
+    cells = split(lines[first - 1], delimiter)
+    while cells and not cells[-1]:
+        cells.pop()
+    below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
+    ended = bool(below) and all(row[-1] == "" for row in below)
+    own, surplus = cells[: width - ended], cells[width - ended :]
+    if (
+        len(cells) <= width
+        or not all(own)
+        or len(set(cells)) < len(cells)
+        or any(is_number(cell, decimal) for cell in cells)
+    ):
+        return lines, ()
+    found = [f'"{cell}"' if delimiter in cell else cell for cell in own]
+    return [*lines[: first - 1], delimiter.join(found), *lines[first:]], tuple(surplus)
+
+
 def _below_labels(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> int:
     """The first whole row of numbers, at `first` or before it."""
     for number, line in enumerate(lines[:first]):
@@ -260,10 +343,11 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
         rows = [found or _heading_cells(line, delimiter, width) for found, line in zip(rows, above, strict=True)]
     units: list[str | None] = [None] * width
     heads = rows[-1] if rows else None
-    if heads is not None and _are_units(heads) and len(rows) > 1 and rows[-2] is not None:
+    above_units = heads is not None and _are_units(heads) and len(rows) > 1 and rows[-2] is not None
+    if heads is not None and above_units:
         units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
         heads = rows[-2]
-    if heads is None or any(is_number(cell, decimal) for cell in heads):
+    if heads is None or (any(is_number(cell, decimal) for cell in heads) and not above_units):
         return Headings(tuple(f"column {i + 1}" for i in range(width)), tuple(units))
     names = []
     for i, cell in enumerate(heads):

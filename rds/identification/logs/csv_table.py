@@ -15,7 +15,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.core.limits import LINE, lifted, refusal
-from rds.identification.logs.csv_layout import BLANKS, Layout, is_number, sniff, split
+from rds.identification.logs.csv_layout import BLANKS, Layout, in_rows, is_number, sniff, split
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.logs.table import Column, Table, since_first
 from rds.identification.logs.units import factor, unit_of_name
@@ -26,6 +26,7 @@ _TAIL = 1 << 14  # bytes at the end in which a cut is looked for
 _REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")
 _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 _DAY = 86400.0  # s
+_WIDE, _TIMES_WIDER = 100, 10  # columns from which, and rows of which, a table lies on its side
 _END = b"EOF"  # the last line of an export of TwinCAT's scope
 _NULLS = [" ", *BLANKS, *(word.upper() for word in BLANKS), "NaN", "Null", "None", "Inf", "+Inf", "-Inf"]
 
@@ -84,6 +85,8 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
     if remarks:
         findings.append(Finding("comments", f"{remarks} remarks between the rows were passed over"))
     rows = max(map(len, values.values()), default=0)
+    if len(names) >= _WIDE and _TIMES_WIDER * rows < len(names):
+        raise in_rows(f"it has {rows} rows of {len(names)} cells", path)
     if layout.passed:
         what = f"a line above the first row of data has numbers, too, and was passed over: {layout.passed[:80]!r}"
         findings.append(Finding("headings", what, Gravity.WARNING))
@@ -93,8 +96,13 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
         findings.append(Finding("units", what, Gravity.WARNING))
     if layout.announced is not None and layout.announced > rows:
         findings.append(missing_samples(layout.announced, rows, "the file announces"))
+    if layout.surplus:
+        what = f"no cells stand below {', '.join(map(repr, layout.surplus[:8]))} in the heading, which is wider than "
+        findings.append(Finding("headings", what + "the rows; the others were taken from the left"))
     columns = {}
     for at, (name, unit) in enumerate(zip(names, layout.units, strict=True)):
+        if at < layout.beside:
+            continue
         unit = unit_of_name(name) if unit is None else unit
         if at in texts:
             columns[name] = Column(name, unit, np.full(rows, np.nan), text=texts[at])

@@ -12,6 +12,9 @@ _FEW_STEPS = 20  # encoder steps of motion, and samples, below which a log tells
 _LEAST = 0.01  # of the windows
 _LEVEL = 0.02  # of the largest command: what is nearer counts as the same level
 _SHORT = 100  # samples
+_ANY_STEPS = 3  # of a speed, below which it is constant
+_WINDOWS = 8  # of a motion that starts
+_AT_REST, _STEADY = 0.5, 0.3  # of the steady speed: the first one, and how far the later ones are apart
 _MOVED = 5.0  # encoder steps
 _BEYOND_NOISE = 12.0  # standard deviations: noise alone spans 10.4 in 10^7 samples
 
@@ -19,15 +22,31 @@ _BEYOND_NOISE = 12.0  # standard deviations: noise alone spans 10.4 in 10^7 samp
 def excitation(log: Log, axis: Axis | None) -> list[Finding]:
     """What the data leave unidentifiable, for want of excitation."""
     unit, volts = log.units.get("position", "mm"), log.units.get("command", "V")
-    if np.ptp(log.command) == 0.0:
+    constant = np.ptp(log.command) == 0.0
+    if constant and not _starts(log):
         what = f"the command is {log.command[0]:g} {volts} throughout: it excites nothing, and no gain can be told"
         return [Finding("excitation", what, Gravity.FAULT)]
+    found = []
+    if constant:
+        what = (
+            f"the command is {log.command[0]:g} {volts} throughout, and the axis starts under it: the log begins with "
+            "its step. It tells a time constant and one steady speed; for gain and friction apart fit it together "
+            "with logs of other levels, for a delay begin the log before the step"
+        )
+        found.append(Finding("excitation", what, Gravity.WARNING))
     reach = float(np.ptp(log.position))
-    if reach == 0.0 or (log.resolution is not None and reach < _FEW_STEPS * log.resolution):
+    coarse = log.resolution is not None and reach < _FEW_STEPS * log.resolution
+    if log.is_rate and coarse and reach > _ANY_STEPS * (log.resolution or 0.0):
+        coarse = False
+        what = (
+            f"the speed takes {reach / (log.resolution or 1.0):.0f} steps of {log.resolution:.4g} {unit} in all: take "
+            "its differences over more samples, or log the position as well"
+        )
+        found.append(Finding("quantization", what, Gravity.WARNING))
+    if reach == 0.0 or coarse:
         steps = f" ({reach / log.resolution:.0f} encoder steps)" if log.resolution else ""
         what = f"the axis hardly moves: {reach:.4g} {unit}{steps} in all; give it a larger command"
         return [Finding("excitation", what, Gravity.FAULT)]
-    found = []
     if len(log) < _SHORT:
         what = f"it has only {len(log)} samples; intervals from so few are wide, if they hold at all"
         found.append(Finding("excitation", what, Gravity.WARNING))
@@ -39,7 +58,7 @@ def excitation(log: Log, axis: Axis | None) -> list[Finding]:
                 f"the axis never moves in the {word} direction: the friction of that direction (F{sign}) cannot be told"
             )
             found.append(Finding("excitation", what, Gravity.WARNING))
-    if _levels(log.command, 1.0) <= 1 and _levels(log.command, -1.0) <= 1:
+    if not constant and _levels(log.command, 1.0) <= 1 and _levels(log.command, -1.0) <= 1:
         what = (
             "the command has one level in each direction: from one steady speed the gain K and the friction cannot be "
             "told apart; use two amplitudes or more, or a signal that sweeps"
@@ -51,6 +70,21 @@ def excitation(log: Log, axis: Axis | None) -> list[Finding]:
         what = "the axis never stands still against a command: the data say little about friction at standstill"
         found.append(Finding("excitation", what))
     return found
+
+
+def is_steady(log: Log) -> bool:
+    """Whether an axis only goes on under a constant command: by itself it tells nothing, beside other logs a speed."""
+    moves = bool(log.position.any()) if log.is_rate else bool(np.ptp(log.position) > 0.0)
+    return moves and bool(np.ptp(log.command) == 0.0) and bool(log.command[0] != 0.0) and not _starts(log)
+
+
+def _starts(log: Log) -> bool:
+    """Whether the axis goes from rest to a steady speed under a constant command: a step response without its begin."""
+    speed = motion(log).speed
+    if log.command[0] == 0.0 or len(speed) < _WINDOWS:
+        return False
+    first, last = (log.position[0] if log.is_rate else speed[0]), float(np.median(speed[len(speed) // 2 :]))
+    return abs(first) < _AT_REST * abs(last) and float(np.ptp(speed[len(speed) // 2 :])) < _STEADY * abs(last)
 
 
 def _goes(log: Log, way: float, reach: float) -> bool:

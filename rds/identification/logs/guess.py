@@ -13,38 +13,34 @@ from rds.core.toml_text import toml_text
 from rds.identification.logs.map import SUFFIX, LogMap, TimeMap
 from rds.identification.logs.map_axis import DIMENSIONS, UNKNOWN, AxisMap, ColumnMap
 from rds.identification.logs.table import Column, Table, remedy
-from rds.identification.logs.units import dimension, known_units
+from rds.identification.logs.units import dimension, factor, known_units
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
 
 _DRIVING = frozenset(("torque", "force", "effort", "drehmoment", "kraft"))
-_VOLTAGES = frozenset(("voltage", "volt", "volts", "spannung", "motorspannung", "ankerspannung"))
-_CURRENTS = frozenset(("current", "amps", "strom", "iststrom", "motorstrom", "ankerstrom", "i", "amperage"))
+_VOLTAGES = _words("voltage volt volts spannung motorspannung ankerspannung voltaje voltagem tensao tensione")
+_CURRENTS = _words("current amps strom iststrom motorstrom ankerstrom i amperage corrente corriente courant")
 _ACTS = _DRIVING | _VOLTAGES | {"current", "strom", "motorstrom", "ankerstrom"}
 # words of names, lower case, that tell a quantity; the first that fits
 _WORDS: Mapping[str, frozenset[str]] = {
-    "time": frozenset(("time", "t", "zeit", "timestamp", "timestamps", "elapsed", "seconds", "zeitstempel")),
-    "reference": frozenset(
-        ("reference", "ref", "setpoint", "set", "desired", "target", "commanded", "soll", "demand", "qg")
-    ).union(("sollposition", "lagesollwert", "solldrehzahl", "sollgeschwindigkeit", "drehzahlsollwert")),
-    "velocity": frozenset(
-        (
-            "velocity",
-            "velo",
-            "vel",
-            "speed",
-            "v",
-            "rate",
-            "geschwindigkeit",
-            "drehzahl",
-            "istdrehzahl",
-            "istgeschwindigkeit",
-            "drehzahlistwert",
-        )
+    "time": _words("time t zeit timestamp timestamps elapsed seconds zeitstempel tempo tiempo"),
+    "reference": _words(
+        "reference ref setpoint set desired target commanded soll demand qg sollposition lagesollwert solldrehzahl "
+        "sollgeschwindigkeit drehzahlsollwert referencia consigna consigne riferimento"
+    ),
+    "velocity": _words(
+        "velocity velo vel speed v rate geschwindigkeit drehzahl istdrehzahl istgeschwindigkeit drehzahlistwert "
+        "velocidade velocidad vitesse velocita"
     ),
     "current": _CURRENTS,
     "command": frozenset(("command", "cmd", "u", "input", "control", "vir")).union(_DRIVING, _VOLTAGES),
-    "position": frozenset(
-        ("measured", "position", "pos", "encoder", "enc", "y", "x", "q", "qm", "ist", "output", "angle", "counts")
-    ).union(("feedback", "actual", "act", "istposition", "lageistwert", "lage")),
+    "position": _words(
+        "measured position pos encoder enc y x q qm ist output angle counts feedback actual act istposition "
+        "lageistwert lage posicao posicion posizione salida"
+    ),
 }
 # never what was measured
 _OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration", "accel", "acc"))
@@ -82,7 +78,7 @@ def guess(table: Table) -> Guess:
             doubts.append(f"{name}: {doubt}" if len(groups) > 1 else doubt)
             continue
         axes[name] = AxisMap(name, {q: ColumnMap(c.name, place="the guessed map") for q, c in found.items()})
-        said += [f"{q} of {name} is {c.name!r} [{c.unit}]" for q, c in found.items()]
+        said += [f"{_called(q, c)} of {name} is {c.name!r} [{c.unit}]" for q, c in found.items()]
     strange = [c for c in table.columns.values() if _is_strange(c)]
     said += [f"{c.name!r} is not used, as its unit {c.unit!r} is unknown" for c in strange]
     if doubts or not axes:
@@ -92,6 +88,11 @@ def guess(table: Table) -> Guess:
                 return Guess(None, spoiled, is_log=False)
         return Guess(None, "; ".join(doubts) or "no column tells a command and a position by its name and unit")
     return Guess(LogMap(TimeMap(time, place="the guessed map"), axes, said=tuple(said)), "")
+
+
+def _called(quantity: str, column: Column) -> str:
+    """What a guess calls a quantity: a position that is a speed, as a spindle's, is called one."""
+    return "speed" if quantity == "position" and dimension(column.unit or "") == "angular speed" else quantity
 
 
 def draft(table: Table) -> str:
@@ -196,13 +197,24 @@ def _why_no_time(column: Column) -> str:
     rows, steps = len(column.values), np.diff(column.values[np.isfinite(column.values)])
     if len(steps) and np.mean(steps < 0.0) >= _RISING:
         return f"{column.name!r} goes down from row to row; sort the rows by it, the oldest first"
-    if len(steps) and steps.min() == 0.0 and steps.max() > 0.0:
-        return (
+    if _is_coarse(column):
+        sentence = (
             f"{column.name!r} stays the same in {int(np.sum(steps == 0.0))} of {rows} rows: its stamps are coarser "
             "than the sample period; export it with more digits, or, if the rows are equally spaced in time, say so in "
-            "a map: rate = 1000.0 (Hz) under [time] in place of the column"
+            "a map: "
         )
+        if dimension(column.unit or "") != "time":
+            return sentence + "rate = 1000.0 (Hz) under [time] in place of the column"
+        there = column.values[np.isfinite(column.values)]
+        slope = float(np.polyfit(np.arange(len(there)), there, 1)[0]) * factor(str(column.unit), "s")
+        return sentence + f"rate = {1.0 / slope:.4g} (Hz, as its stamps go on the whole) under [time] in its place"
     return f"{column.name!r} does not increase from row to row ({rows} rows)"
+
+
+def _is_coarse(column: Column) -> bool:
+    """Whether the values go up, and stay the same between."""
+    steps = np.diff(column.values[np.isfinite(column.values)])
+    return len(steps) > 0 and float(steps.min()) == 0.0 and float(steps.max()) > 0.0
 
 
 def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
@@ -210,9 +222,11 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     units = {dimension(c.unit or "") for c in columns} | {"adc" for c in columns if c.name.endswith("_adc")}
     numbered = next((c.name for c in columns if c.name.lower() in _ORDINALS), None)
     sentence = f"{_NO_LOG}: "
-    if any(_role(c.name) == "time" for c in in_time):
-        column = next(c for c in in_time if _role(c.name) == "time")
-        return sentence + _why_no_time(column)
+    called = next((c for c in in_time if _role(c.name) == "time"), None)
+    if called is None and len(in_time) == 1 and _is_coarse(in_time[0]):
+        called = in_time[0]  # as an oscilloscope rounds it
+    if called is not None:
+        return sentence + _why_no_time(called)
     if in_time:
         names = ", ".join(c.name for c in in_time[:3]) + (" ..." if len(in_time) > 3 else "")
         sentence += f"its columns in s ({names}) are durations, and none increases from row to row"

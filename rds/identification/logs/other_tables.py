@@ -47,7 +47,10 @@ def read_mat(path: Path) -> Table:
     others = [f"{name} ({len(values)})" for name, values in vectors.items() if len(values) != length]
     findings = []
     if others:
-        what = f"left out, as they do not have {length} values like the others: {', '.join(others)}"
+        what = (
+            f"left out, as they do not have {length} values like the others: {', '.join(others)}; where they belong to "
+            "the log, put them on its times in MATLAB, as in y = interp1(t2, y2, t), or save them as a second file"
+        )
         findings.append(Finding("columns", what))
     if left_out:
         findings.append(Finding("columns", f"left out, as they hold no real numbers: {', '.join(left_out)}"))
@@ -88,6 +91,10 @@ def _as_vectors(of_class: str, name: str) -> str:
         return f"t = {name}.Time; y = {name}.Data; save('log.mat', 't', 'y')"
     if of_class == "timetable":
         return f"t = seconds({name}.Time - {name}.Time(1)); y = {name}.(1); save('log.mat', 't', 'y')"
+    if of_class == "iddata":
+        return (
+            f"t = {name}.SamplingInstants; u = {name}.InputData; y = {name}.OutputData; save('log.mat', 't', 'u', 'y')"
+        )
     if of_class == "table":
         return f"s = table2struct({name}, 'ToScalar', true); save('log.mat', 's')"
     return "t = ...; y = ...; save('log.mat', 't', 'y')"

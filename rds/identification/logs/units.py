@@ -41,20 +41,20 @@ _SPELLINGS: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(("sec", "secs", "second", "seconds", "Sekunden"), "s"),
         **dict.fromkeys(("sek", "Sek", "Sec", "Second", "Seconds", "Sekunde"), "s"),
-        **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
-        **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
+        **dict.fromkeys(("msec", "millisec", "millis", "millisecond", "milliseconds"), "ms"),
+        **dict.fromkeys(("usec", "microsec", "micros", "microsecond", "microseconds"), "us"),
         **dict.fromkeys(("meter", "metre", "meters", "metres"), "m"),
         **dict.fromkeys(("millimeter", "millimetre", "millimeters", "millimetres", "Millimeter"), "mm"),
         **dict.fromkeys(("micron", "microns", "micrometer", "micrometre", "micrometers", "Mikrometer"), "um"),
         **dict.fromkeys(("inch", "inches"), "in"),
         **dict.fromkeys(("°", "degree", "degrees", "Grad"), "deg"),
         **dict.fromkeys(("radian", "radians"), "rad"),
-        **dict.fromkeys(("°/s", "deg/sec"), "deg/s"),
+        **dict.fromkeys(("°/s", "deg/sec", "dps"), "deg/s"),
         **{f"{length}/sec": f"{length}/s" for length in ("m", "mm", "um", "in", "rad")},
         **dict.fromkeys(("rpm", "RPM", "r/min", "U/min", "1/min", "min-1"), "rev/min"),
         **dict.fromkeys(("U/s", "r/s", "rps"), "rev/s"),
-        **dict.fromkeys(("count", "cts", "inc", "incs", "increments", "ticks", "pulses"), "counts"),
-        **dict.fromkeys(("cts/s", "inc/s", "ticks/s"), "counts/s"),
+        **dict.fromkeys(("count", "cts", "inc", "incs", "increments", "ticks", "pulses", "steps"), "counts"),
+        **dict.fromkeys(("cts/s", "inc/s", "ticks/s", "pulses/s", "steps/s", "count/s", "counts/sec"), "counts/s"),
         **dict.fromkeys(("volt", "volts", "Volt", "Volts"), "V"),
         **dict.fromkeys(("ampere", "amperes", "amp", "amps", "Ampere", "Amp", "Amps"), "A"),
         **dict.fromkeys(("N.m", "N*m", "N·m"), "Nm"),
@@ -67,7 +67,27 @@ _BY_UNIT = MappingProxyType(
 )
 _ALIKE = 0.75  # of the letters: what is less alike is another unit, not a slip
 # endings of names that say a unit, as in `pos_mm`; not those that are as likely something else (x_in, a_1, p_m)
-_ENDINGS = ("s", "ms", "us", "ns", "mm", "um", "deg", "rad", "counts", "V", "mV", "A", "mA", "N", "Nm", "rpm")
+_ENDINGS = (
+    "s",
+    "sec",
+    "ms",
+    "msec",
+    "us",
+    "usec",
+    "ns",
+    "mm",
+    "um",
+    "deg",
+    "rad",
+    "counts",
+    "V",
+    "mV",
+    "A",
+    "mA",
+    "N",
+    "Nm",
+    "rpm",
+)
 _RATES = re.compile(r"(?P<stem>.+?)_(?P<unit>mm|um|m|cm|in|deg|rad|rev|counts|inc)_(?:p|per)?_?(?P<time>s|sec|min)")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rds.identification.fit.estimate import guesses
+from rds.identification.fit.estimate import guesses, names_of
 from rds.identification.validate.assessment import Assessment, Range, largest
 from rds.identification.validate.candidate import Candidate
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
@@ -122,11 +122,11 @@ def overall(verdicts: dict[str, Verdict], between: tuple[Reason, ...] = ()) -> V
     sentence = " ".join(verdict.sentence for verdict in chosen.values())
     if others:
         sentence += " Beside that: " + ", ".join(f"{name}: {verdict.word}" for name, verdict in others.items()) + "."
-    reasons = tuple(
-        Reason(reason.side, reason.kind, f"{name}: {reason.what}")
-        for name, verdict in verdicts.items()
-        for reason in verdict.reasons
-    )
+    given: dict[tuple[Side, str, str], list[str]] = {}  # names of the logs by what they say
+    for name, verdict in verdicts.items():
+        for reason in verdict.reasons:
+            given.setdefault((reason.side, reason.kind, reason.what), []).append(name)
+    reasons = tuple(Reason(side, kind, f"{names_of(names)}: {what}") for (side, kind, what), names in given.items())
     if between:
         sentence += " The logs contradict each other."
     return Verdict(word, sentence, (*between, *reasons), "; ".join(purposes))

@@ -126,7 +126,10 @@ def as_axis(candidate: Candidate, log: Log, noise: float, frequency: float = 0.0
             )
 
         point = best.point[: len(problem.names)]
-        return Off(of(point), error_of(of, point, covariance), _UNITS[measure])
+        value, error = of(point), error_of(of, point, covariance)
+        if measure in _GAINS:  # of a ratio to a gain that the log leaves nearly infinite, derivatives say too little
+            error = max(error, 100.0 * error_of(lambda p: log_of(1.0 + of(p) / 100.0), point, covariance))
+        return Off(value, error, _UNITS[measure])
 
     return Discrepancy(
         frequency=f,
@@ -200,7 +203,13 @@ def _sure_of_tau(problem: Problem, here: Mapping[str, float], covariance: np.nda
     return here["tau"] if error <= _SURE * here["tau"] else model
 
 
+_GAINS = ("gain", "static")
 _UNITS = {"gain": "%", "static": "%", "phase": "°", "lag": "s", "delay": "s", "forward": "%", "backward": "%"}
+
+
+def log_of(ratio: float) -> float:
+    """Its logarithm; 0 for what has none: a gain of the other sign is off whatever its error."""
+    return float(np.log(ratio)) if 0.0 < ratio < np.inf else 0.0
 
 
 def clear(off: Off) -> float:

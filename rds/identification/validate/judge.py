@@ -132,7 +132,7 @@ def _band(percent: float, least: float) -> str:
 
 def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
     found = judged_by(a, bands)
-    moves = a.motion > 0.0 and a.motion >= bands.least_steps * (a.log.resolution or 0.0)
+    moves = a.motion > 0.0 and a.motion >= bands.steps(a.log.is_rate) * (a.log.resolution or 0.0)
     if found is None or a.free_run is None or not moves:
         return
     for measure in measures(a, bands):

@@ -31,12 +31,12 @@ def of_data(a: Assessment, bands: Bands) -> Iterator[Reason]:
         yield Reason(Side.NOTE, "provenance", f"{a.overlap.how}; make sure that they are others")
     if a.motion == 0.0:
         yield Reason(Side.CANNOT_TELL, "no-motion", f"the axis never moves ({a.measured[0]:.6g} {a.unit} throughout)")
-    elif a.motion < bands.least_steps * resolution:
-        steps = a.motion / resolution
+    elif a.motion < bands.steps(log.is_rate) * resolution:
+        steps, whose = a.motion / resolution, "its resolution" if log.is_rate else "its encoder"
         yield Reason(
             Side.CANNOT_TELL,
             "no-motion",
-            f"the axis moves {a.motion:.4g} {a.unit}, {steps:.0f} steps of its encoder; {bands.least_steps:.0f} are "
+            f"the axis moves {a.motion:.4g} {a.unit}, {steps:.0f} steps of {whose}; {bands.steps(log.is_rate):.0f} are "
             "needed to tell a model from none",
         )
     elif float(a.measured.std()) <= AS_NOISE * a.noise:
@@ -57,7 +57,7 @@ def of_data(a: Assessment, bands: Bands) -> Iterator[Reason]:
         yield Reason(
             Side.CANNOT_TELL,
             "no-excitation",
-            f"the command is {log.command[0]:.4g} V throughout: it excites no dynamics",
+            f"the command is {log.command[0]:.4g} {log.units.get('command', 'V')} throughout: it excites no dynamics",
         )
     if (disturbed := held(log)) is not None:  # of this log: it may be a part of another, which has moved
         yield Reason(Side.CANNOT_TELL, disturbed.kind, disturbed.what)
@@ -100,7 +100,7 @@ def of_upsets(a: Assessment) -> Iterator[Reason]:
     """Where in time the log does something else; the verdict is on the whole."""
     if a.free_run is None or a.motion == 0.0:
         return
-    for sentence in upsets(a.time, a.residual, a.noise, a.unit):
+    for sentence in upsets(a.time, a.residual, a.noise, a.unit, a.measured - a.residual):
         yield Reason(Side.NOTE, "upset", sentence)
 
 

@@ -91,6 +91,7 @@ class Bands:
     seen: float = 0.05  # share of the log that the fit may have seen
     least_changes: float = 3.0  # of the velocity, from above its mean to below it or back
     least_steps: float = 20.0  # of the encoder, that the axis must at least move
+    least_speed_steps: float = 8.0  # of a speed, where that was logged: it counts anew in each sample
     skill: float = 0.5  # a prediction's RMSE must be less than so much of that without a model
     worse: float = 2.0  # RMSE of predictions here over those on the fit's data: beyond it, these were particular
     attainable: float = 2.0  # RMSE over that of the same structure fitted to this very log
@@ -110,6 +111,10 @@ class Bands:
             value = getattr(self, field.name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1e9:
                 raise InputError(f"band {field.name} = {value!r} must be a number of 0 or more")
+
+    def steps(self, is_rate: bool) -> float:
+        """How many steps of its resolution a position, or a speed, must at least go through."""
+        return self.least_speed_steps if is_rate else self.least_steps
 
     @classmethod
     def read(cls, given: Mapping[str, float]) -> Bands:

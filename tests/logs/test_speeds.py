@@ -1,0 +1,174 @@
+"""Logs of a speed, as small motors make them: coarse speeds, steps that begin the log, spikes of a counter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rds.identification.fit.fit import fit
+from rds.identification.fit.upsets import upsets
+from rds.identification.logs.findings import with_findings
+from rds.identification.logs.log import Finding, Gravity, Log
+from rds.identification.structures.structures import structure
+from rds.identification.validate.candidate import Candidate
+from rds.identification.validate.discrepancy import as_axis
+from rds.identification.validate.validate import validate
+
+T, TAU, K, FRICTION = 0.005, 0.08, 22.0, 15.0  # s, s, (rev/min)/V, rev/min
+
+
+def speed_log(command: np.ndarray, step: float = 0.1, tau: float = TAU, name: str = "motor", period: float = T) -> Log:
+    """The speed of a motor from rest, in steps of `step` rev/min as a counter makes them, with the log's findings."""
+    w = np.zeros(len(command))
+    share = 1.0 - np.exp(-period / tau)
+    for k, u in enumerate(command[:-1]):
+        w[k + 1] = w[k] + share * (K * u - FRICTION * np.sign(u) - w[k])
+    place = np.cumsum(w) * period  # differences of a rounded position
+    counted = np.diff(np.floor(place / (step * period) + 0.3) * step * period, prepend=0.0) / period
+    counted = np.round(counted, 6)
+    units = {"position": "rev/min", "command": "V"}
+    t = np.arange(len(command)) * period
+    return with_findings(Log(name, t, command, counted, units=units, closed_loop=False))
+
+
+def said(log: Log, kind: str) -> list[Finding]:
+    return [finding for finding in log.findings if finding.kind == kind]
+
+
+def test_a_log_that_begins_with_its_step_is_no_fault() -> None:
+    """Several levels together tell gain, friction and time constant, as courses find them."""
+    logs = [speed_log(np.full(120, volts), name=f"{volts:g} V") for volts in (3.0, 5.0, 8.0, 12.0)]
+    (first, *_) = said(logs[0], "excitation")
+    assert first.gravity is Gravity.WARNING and "the log begins with its step" in first.what
+    found = fit(logs, structure("axis"))
+    assert not found.unusable()
+    assert found.parameters["K"].value == pytest.approx(K, rel=0.01)
+    assert found.parameters["tau"].value == pytest.approx(TAU, rel=0.03)
+    assert found.parameters["friction_plus"].value == pytest.approx(FRICTION, rel=0.05)
+
+
+def test_one_step_alone_tells_gain_and_friction_together_only() -> None:
+    found = fit([speed_log(np.full(120, 8.0))], structure("axis"))
+    assert any("K" in sentence and "friction_plus" in sentence for sentence in found.unidentifiable)
+
+
+@pytest.mark.parametrize("start", [0.0, 161.0])
+def test_a_constant_command_under_which_nothing_starts_is_a_fault(start: float) -> None:
+    units = {"position": "rev/min", "command": "V"}
+    t = np.arange(400) * T
+    log = with_findings(Log("steady", t, np.full(400, 8.0), start + 0.1 * np.sin(7.0 * t), units=units))
+    assert said(log, "excitation")[0].gravity is Gravity.FAULT
+
+
+def test_a_steady_log_beside_others_spoils_no_fit() -> None:
+    levels = np.repeat([2.0, -3.0, 6.0, -9.0, 12.0, -5.0], 80)
+    steady = speed_log(np.full(400, 7.0), name="steady")
+    steady = with_findings(
+        Log("steady", steady.time[200:], steady.command[200:], steady.position[200:], units=steady.units)
+    )
+    assert said(steady, "excitation")[0].gravity is Gravity.FAULT
+    found = fit([speed_log(levels), steady], structure("axis"))
+    assert not found.unusable() and any(w.startswith("steady: the command is 7 V") for w in found.warnings)
+    assert fit([steady], structure("axis")).unusable()
+
+
+def test_a_coarse_speed_is_no_axis_that_hardly_moves() -> None:
+    """A speed by the counts of each millisecond has few levels, and its means tell it all the same."""
+    command = np.where(np.arange(2000) < 400, 0.0, 24.0)
+    log = speed_log(command, step=38.5, tau=0.0265, period=0.001)
+    assert not any(finding.gravity is Gravity.FAULT for finding in log.findings)
+    assert any("steps of 38.5 rev/min in all" in finding.what for finding in said(log, "quantization"))
+    found = fit([log], structure("axis"), options={"fixed": {"friction_plus": FRICTION}})
+    assert found.parameters["K"].value == pytest.approx(K, rel=0.03)
+    assert found.parameters["tau"].value == pytest.approx(0.0265, rel=0.1)
+    fresh = speed_log(
+        np.repeat([0.0, 24.0, 12.0, 20.0, 0.0, 22.0], 400), step=38.5, tau=0.0265, period=0.001, name="fresh"
+    )
+    verdict = validate(found, fresh).verdict
+    assert verdict.ok, str(verdict)
+    stands = speed_log(np.where(np.arange(2000) < 400, 0.0, 1.5), step=38.5, period=0.001)
+    assert any("hardly moves" in finding.what for finding in stands.findings if finding.gravity is Gravity.FAULT)
+
+
+def test_the_only_step_of_a_log_is_no_other_regime() -> None:
+    """What a structure lacks shows where the axis accelerates, and nowhere else in such a log."""
+    command = np.where(np.arange(2000) < 400, 0.0, 12.0)
+    late = np.roll(speed_log(command).position, 8)  # a delay that the structure lacks
+    late[:8] = 0.0
+    units = {"position": "rev/min", "command": "V"}
+    draw = np.random.default_rng(0)
+    log = Log("late", np.arange(2000) * T, command, late + 0.5 * draw.standard_normal(2000), units=units)
+    found = fit([log], structure("axis"))
+    assert any("residuals" in warning for warning in found.warnings)
+    assert not any("another regime" in warning or "leaps by" in warning for warning in found.warnings)
+    reasons = validate(found, log).verdict.reasons
+    assert not any("another regime" in reason.what or "leaps by" in reason.what for reason in reasons)
+
+
+def test_spikes_of_a_speed_are_told_with_their_times() -> None:
+    t = np.arange(6000) * T
+    log = speed_log(6.0 * np.sin(2.0 * np.pi * 0.2 * t) + 4.0 * np.sign(np.sin(2.0 * np.pi * 0.55 * t)))
+    assert not said(log, "leap")
+    spiked = log.position.copy()
+    for k in (1311, 3932):
+        spiked[k : k + 12] += 1500.0 * np.exp(-np.arange(12) / 4.0)  # a filter behind the faulty difference
+    with_spikes = with_findings(Log("spikes", log.time, log.command, spiked, units=log.units))
+    (found,) = said(with_spikes, "leap")
+    assert "at 6.555 s" in found.what and "at 19.66 s" in found.what and found.gravity is Gravity.WARNING
+    lost = log.position.copy()
+    lost[[0, 1266]] = 3000.0, 0.0  # before the first difference, and where one is missing
+    (found,) = said(with_findings(Log("lost", log.time, log.command, lost, units=log.units)), "leap")
+    assert "at 0 s to 3000, at 6.33 s to 0 rev/min" in found.what
+
+
+@pytest.mark.parametrize("kind", ["pulse", "steps", "noise"])
+def test_a_speed_that_the_command_asks_for_is_no_spike(kind: str) -> None:
+    k = np.arange(6000)
+    draw = np.random.default_rng(1)
+    command = {
+        "pulse": np.where((k > 3000) & (k < 3025), 24.0, 3.0),
+        "steps": np.repeat(draw.uniform(-12.0, 12.0, 60), 100),
+        "noise": draw.normal(0.0, 4.0, 6000),
+    }[kind]
+    assert not said(speed_log(command, tau=0.004), "leap")
+
+
+def test_what_several_logs_have_in_common_is_said_once() -> None:
+    logs = [speed_log(np.full(120, 8.0), name=f"run {k}") for k in range(6)]
+    warnings = fit(logs, structure("axis")).warnings
+    (step,) = [w for w in warnings if "the log begins with its step" in w]
+    assert step.startswith("run 0, run 1, run 2, run 3 and 2 more: the command is 8 V")
+
+
+def test_a_model_that_is_too_slow_sees_no_slip_of_the_encoder() -> None:
+    """Beside the quick start of a chirp the error grows within a tenth of a second, and not in a sample."""
+    t = np.arange(10000) * 0.001
+    u = 12.0 * np.sin(2.0 * np.pi * (1.0 * t + 1.0 * t**2))
+    axis = structure("axis")
+    values = {"tau": 0.2, "K": 2000.0, "friction_plus": 100.0, "friction_minus": -100.0}
+    y = axis.respond(t, u, (0.0, 0.0), values)
+    drift = np.cumsum(np.random.default_rng(0).normal(0.0, 0.02, len(t)))  # friction differs from place to place
+    late = y - axis.respond(t, u, (0.0, 0.0), {**values, "tau": 0.22}) + drift
+    slipped = late + 120.0 * (t >= 6.0)
+    assert not any("leaps by" in sentence for sentence in upsets(t, late, 0.2, "deg", y - late))
+    assert any("at 6 s the measurement leaps by" in sentence for sentence in upsets(t, slipped, 0.2, "deg", y - late))
+
+
+def test_a_flywheel_s_gain_at_rest_is_not_told_by_a_log_that_never_comes_to_rest() -> None:
+    """Of a time constant of many swings only its ratio to the gain is known, however sure a slope looks."""
+    made = structure("axis", output="rev/min")
+    draw = np.random.default_rng(1)
+    t = np.arange(3000) * 0.01
+    u = np.repeat(draw.uniform(-0.8, 0.8, 30), 100)
+    truth = {"tau": 300.0, "K": 54e3, "friction_plus": 1500.0, "friction_minus": -1500.0}
+    y = made.respond(t, u, (0.0,), truth) + 0.3 * draw.standard_normal(len(t)) + 8.0 * np.sin(0.4 * t)
+    units = {"position": "rev/min", "command": "V"}
+    log = Log("flywheel", t, u, y, units=units, closed_loop=False)
+    model = {
+        "tau": 11.0,
+        "K": 1980.0,
+        "friction_plus": 55.0,
+        "friction_minus": -55.0,
+    }  # the same gain over time constant
+    found = as_axis(Candidate("model", made, model), log, 0.3)
+    assert found is not None and not (found.gain.at == 0.0 and abs(found.gain.value) > 3.5 * found.gain.error)
