@@ -376,8 +376,16 @@ def test_refusals(tmp_path: Path) -> None:
 @given(st.text())
 def test_no_cell_of_a_table_is_a_formula(text: str) -> None:
     (row,) = csv.reader(io.StringIO(csv_text([[text, "x"]]), newline=""))
-    assert not row[0].startswith(("=", "+", "-", "@", "\t", "\r", "\n"))
+    assert not row[0].startswith(("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠"))
     assert row[1] == "x"
+
+
+@pytest.mark.parametrize("separator", [";", "\t", "|"])
+def test_a_spreadsheet_of_another_country_finds_no_formula_behind_a_separator(separator: str) -> None:
+    """Which takes `;` for the end of a cell, unless it stands between quotation marks."""
+    text = csv_text([[f"ada{separator}=HYPERLINK(1)", "x"]])
+    (row,) = csv.reader(io.StringIO(text), delimiter=separator)
+    assert row[0].startswith(f"ada{separator}=")
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False, width=32))

@@ -44,6 +44,7 @@ CRAMMED = {
     "statements": "        " + "total = t * 2; " * 1000,
     "an expression": "        total = " + " + ".join(["t * 2"] * 1000),
     "instructions of no line": "        unplaced()",
+    "a table of lines that was cut": "        untold()",
 }
 UNPLACED = """
 def unplaced():
@@ -51,7 +52,10 @@ def unplaced():
     while n: n -= 1
 count = len(unplaced.__code__.co_code) // 2
 table = bytes(0x80 | 15 << 3 | min(8, count - at) - 1 for at in range(0, count, 8))  # "no location" for up to 8 each
+untold_code = unplaced.__code__.replace(co_linetable=b"", co_exceptiontable=b"")
 unplaced.__code__ = unplaced.__code__.replace(co_linetable=table)
+def untold(): pass
+untold.__code__ = untold_code
 """
 
 
@@ -224,6 +228,25 @@ else: found["raise"] = signal.raise_signal
     "an audit hook": (
         "sys.addaudithook(lambda event, args: work() if event == 'mine' else None)",
         "before = done[0]; sys.audit('mine')\n    if done[0] > before: return min(abs(r.position - y), 1.0), state",
+    ),
+    "an event whose name works when it is looked up": (
+        """
+class Name(str):
+    def __hash__(self):
+        work()
+        return 1
+name = Name()
+""",
+        "before = done[0]; sys.audit('object.__getattr__', None, name)\n"
+        "    if done[0] > before: return min(abs(r.position - y), 1.0), state",
+    ),
+    "a handler that interrupts the count": (
+        """
+import signal
+signal.signal(signal.SIGALRM, lambda number, frame: work())
+""",
+        "before = done[0]; signal.setitimer(signal.ITIMER_REAL, 1e-6)\n    while done[0] == before: pass\n"
+        "    return min(abs(r.position - y), 1.0), state",
     ),
     "another interpreter": (
         """

@@ -228,6 +228,47 @@ def test_which_file_of_several(tmp_path: Path) -> None:
     assert found["cy"].read() == b"law (1).py"
 
 
+def test_copies_and_older_versions_beside_a_file_do_no_harm(tmp_path: Path) -> None:
+    put(
+        tmp_path,
+        {
+            "ada/controller.py": "new",
+            "ada/old/controller.py": "old",
+            "ben/one.py": "same",
+            "ben/one - Copy.py": "same",
+            "cy/v1/controller.py": "same",
+            "cy/v2/controller.py": "same",
+            "dan/v1/controller.py": "x",
+            "dan/v2/controller.py": "y",
+        },
+    )
+    found = of(tmp_path)
+    assert {name: found[name].read() for name in ("ada", "ben", "cy")} == {"ada": b"new", "ben": b"same", "cy": b"same"}
+    assert "controller.py is graded, and not old/controller.py" in found["ada"].notes
+    assert found["dan"].status is Status.REFUSED and "2 files could be meant" in found["dan"].reason
+
+
+CLASSES = {
+    "folders of students": {"Exercise 1/ada/controller.py": b"a", "Exercise 1/bob/sub/controller.py": b"b"},
+    "one with the right name": {"Exercise 1/ada/controller.py": b"a", "Exercise 1/bob/law.py": b"b"},
+    "in two folders": {"Exercise 1/Submissions/ada/x.py": b"a", "Exercise 1/Submissions/bob/x.py": b"b"},
+    "files of students": {"ps1/ada.py": b"a", "ps1/bob.py": b"b", "ps1/notes.txt": b""},
+    "a table beside them": {"submissions/ada/x.py": b"a", "submissions/bob/controller.py": b"b", "list.xlsx": b""},
+}
+
+
+@pytest.mark.parametrize("files", CLASSES.values(), ids=CLASSES)
+def test_the_folder_around_all_in_a_zip_is_nobody_s(files: dict[str, bytes], tmp_path: Path) -> None:
+    found = of(zipped(tmp_path / "class.zip", files))
+    assert {name: row.read() for name, row in found.items()} == {"ada": b"a", "bob": b"b"}
+
+
+def test_one_student_s_folder_in_a_zip_is_that_student_s(tmp_path: Path) -> None:
+    files = {"ada/controller.py": b"a", "ada/src/helper.py": b"", "ada/tests/try.py": b""}
+    (row,) = of(zipped(tmp_path / "ada.zip", files)).values()
+    assert (row.student, row.read()) == ("ada", b"a")
+
+
 def test_files_that_are_none(tmp_path: Path) -> None:
     secret = tmp_path / "secret.txt"
     secret.write_text("x")
@@ -342,11 +383,12 @@ def test_zips_that_students_hand_in(tmp_path: Path) -> None:
         "nested": own_zip({"inner.zip": own_zip({"controller.py": b"x"})}),
         "broken": b"PK\x03\x04 no zip",
         "empty": own_zip({}),
+        "history": own_zip({"controller.py": b"x", **{f".git/objects/{n:03}": b"" for n in range(MOST_OWN)}}),
     }
     for name, data in handed_in.items():
         (tmp_path / f"{name}.zip").write_bytes(data)
     found = of(tmp_path)
-    assert found["good"].read() == b"x"
+    assert found["good"].read() == found["history"].read() == b"x"
     with pytest.raises(Refusal, match="unpacks to more than"):
         found["large"].read()
     said = {"bomb": "says that it unpacks to", "many": "more than 200", "nested": "another zip", "broken": "not a zip"}

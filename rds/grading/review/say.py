@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished, read_finished
-from rds.grading.feedback.plain_text import cell
+from rds.grading.feedback.plain_text import cell, csv_line
 from rds.grading.review.entries import Entry, Kind, add
 from rds.grading.review.publish import assignment_of, publish
 
@@ -93,6 +93,4 @@ def marks_table(finished: Finished) -> bytes:
             rows.append(
                 (grade.student, score.name, "", "", "", f"{score.score:g}", f"{score.max_score:g}", value or score.band)
             )
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\r\n").writerows([[cell(each) for each in row] for row in rows])
-    return stream.getvalue().encode("utf-8-sig", "replace")
+    return "".join(csv_line(map(cell, row)) for row in rows).encode("utf-8-sig", "replace")
