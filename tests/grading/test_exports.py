@@ -250,6 +250,13 @@ def test_names_are_the_same_however_their_accents_are_written(tmp_path: Path) ->
     assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["26", "-"]
 
 
+def test_a_gradebook_whose_cells_end_at_semicolons_is_filled_in_as_it_came(tmp_path: Path) -> None:
+    book = tmp_path / "grades.csv"
+    book.write_text("Full name;ID number;Assignment: Tracking (Real)\nAda;ada;-\n", encoding="utf-8")
+    done = exported(tmp_path, "moodle", [grade("ada")], ExportOptions(gradebook=book))
+    assert Path(done.files[0]).read_text(encoding="utf-8").splitlines()[1] == "Ada;ada;26"
+
+
 def test_moodle_maximum_grade_is_kept_to(tmp_path: Path) -> None:
     sheet = tmp_path / "worksheet.csv"
     sheet.write_text(WORKSHEET.replace("30.00", "100.00"), encoding="utf-8")

@@ -201,6 +201,8 @@ def test_times_of_the_instructor(tmp_path: Path) -> None:
     assert found["Jose\u0301"].time == datetime(2026, 1, 10, 12, tzinfo=CET)
     assert found["ada"].time == datetime(2026, 1, 10, 13, tzinfo=CET)
     assert found["ben"].time == datetime(2026, 1, 10, 13, tzinfo=UTC)
+    put(tmp_path, {"timestamps.csv": times.replace(",", ";")})  # as a German spreadsheet saves it
+    assert of(tmp_path, zone=CET)["ada"].time == datetime(2026, 1, 10, 13, tzinfo=CET)
 
 
 @pytest.mark.parametrize(

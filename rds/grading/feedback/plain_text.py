@@ -36,6 +36,11 @@ def cell(text: str) -> str:
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
+def uncell(text: str) -> str:
+    """What `cell` was given, of a text without anything that cannot be printed."""
+    return text[1:] if text.startswith("'") and text[1:].startswith(_FORMULA) else text
+
+
 def csv_line(cells: Iterable[str]) -> str:
     """A line of CSV that each spreadsheet cuts at the same places, also one that takes `;` for the end of a cell."""
     quoted = (f'"{each.replace(chr(34), 2 * chr(34))}"' if _SEPARATORS & set(each) else each for each in cells)
