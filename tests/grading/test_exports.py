@@ -22,6 +22,8 @@ from rds.grading.exports import GRADEBOOKS
 from rds.grading.exports.export import Written, export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.exports.one_json import LARGEST
+from rds.grading.feedback.plain_text import LONGEST as MOST
+from rds.grading.feedback.plain_text import cell, uncell
 from rds.grading.grade import Grade, Status
 from tests.grading.grades import HOSTILE, batch_in, grade, score
 
@@ -385,6 +387,7 @@ def test_no_cell_of_a_table_is_a_formula(text: str) -> None:
     (row,) = csv.reader(io.StringIO(csv_text([[text, "x"]]), newline=""))
     assert not row[0].startswith(("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠"))
     assert row[1] == "x"
+    assert not text.isprintable() or len(text) > MOST or uncell(cell(text)) == text
 
 
 @pytest.mark.parametrize("separator", [";", "\t", "|"])

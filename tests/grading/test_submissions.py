@@ -269,6 +269,9 @@ def test_one_student_s_folder_in_a_zip_is_that_student_s(tmp_path: Path) -> None
     files = {"ada/controller.py": b"a", "ada/src/helper.py": b"", "ada/tests/try.py": b""}
     (row,) = of(zipped(tmp_path / "ada.zip", files)).values()
     assert (row.student, row.read()) == ("ada", b"a")
+    moodle = {f"Ada_501_assignsubmission_file_/{name}.py": name.encode() for name in ("one", "two")}
+    (row,) = of(zipped(tmp_path / "moodle.zip", moodle)).values()
+    assert row.student == "Ada_501" and "2 files could be meant (one.py, two.py)" in row.reason
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:

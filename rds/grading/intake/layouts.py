@@ -216,7 +216,8 @@ def _without_root(
     """Without the one folder around everything that exports and courses have, or who packs a folder into a zip."""
     while len(folders) == 1 and all(len(item.parts) > 1 for item in items if _is_handed_in(item)):
         known = re.fullmatch(r"assignment_\d+_export|submitted|submissions", folders[0])
-        if not known and not (zipped and _is_of_a_class(items, accepted)):
+        is_one_s = bool(_MOODLE_FOLDER.fullmatch(folders[0])) or any(item.parts == (METADATA,) for item in items)
+        if not known and (is_one_s or not zipped or not _is_of_a_class(items, accepted)):
             break
         items = [replace(item, parts=item.parts[1:]) if len(item.parts) > 1 else item for item in items]
         folders = sorted({item.parts[0] for item in items if len(item.parts) > 1})
