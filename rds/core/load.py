@@ -356,6 +356,8 @@ def _load_error(error: BaseException, file: Path) -> InputError:
         remedy += "no other file is there, and only numpy, scipy and control: what is graded must be in one file)"
     elif isinstance(error, FileNotFoundError):
         remedy = "check its name; where files are graded, no other file is there: write what it holds into this one"
+    elif isinstance(error, NameError) and error.name in ("get_ipython", "display"):
+        remedy = "a notebook that was saved as Python has such lines: remove them, or hand in the notebook itself"
     elif type(error) is ImportError and "relative import" in str(error):
         remedy = "import a file next to it by its name alone, without the dot; what is graded must be in one file"
     else:

@@ -229,6 +229,7 @@ def test_files_that_cannot_be_read(alone: Path) -> None:
         ("x = 1\n", "law.py: it defines none of control"),
         ("def advance(x, u, T, params):\n    return x\n", "no controller: it defines no control"),
         ("\n1 / 0\n", r"law.py:2: it fails while it loads: .*ZeroDivisionError"),
+        ("get_ipython()\n", r"law.py:1: .*a notebook that was saved as Python has such lines: remove them"),
         ("params = {'a': 1}\ndef control(t, r, y, state, params):\n    return 0.0, ()\n", "unknown parameter 'gain'"),
     ],
 )

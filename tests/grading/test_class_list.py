@@ -32,6 +32,7 @@ def test_a_list_is_read_and_written_as_it_is(tmp_path: Path) -> None:
     assert found.sections() == ("A", "B") and list(found.groups()) == ["red"]
     (tmp_path / "again.csv").write_bytes(found.to_csv())
     assert read_class_list(tmp_path / "again.csv") == found
+    assert listed(tmp_path, "\ufeff" + TEXT.replace(",", ";")) == found  # as a German spreadsheet saves it
 
 
 @pytest.mark.parametrize(

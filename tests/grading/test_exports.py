@@ -22,6 +22,8 @@ from rds.grading.exports import GRADEBOOKS
 from rds.grading.exports.export import Written, export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.exports.one_json import LARGEST
+from rds.grading.feedback.plain_text import LONGEST as MOST
+from rds.grading.feedback.plain_text import cell, uncell
 from rds.grading.grade import Grade, Status
 from tests.grading.grades import HOSTILE, batch_in, grade, score
 
@@ -250,6 +252,13 @@ def test_names_are_the_same_however_their_accents_are_written(tmp_path: Path) ->
     assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["26", "-"]
 
 
+def test_a_gradebook_whose_cells_end_at_semicolons_is_filled_in_as_it_came(tmp_path: Path) -> None:
+    book = tmp_path / "grades.csv"
+    book.write_text("Full name;ID number;Assignment: Tracking (Real)\nAda;ada;-\n", encoding="utf-8")
+    done = exported(tmp_path, "moodle", [grade("ada")], ExportOptions(gradebook=book))
+    assert Path(done.files[0]).read_text(encoding="utf-8").splitlines()[1] == "Ada;ada;26"
+
+
 def test_moodle_maximum_grade_is_kept_to(tmp_path: Path) -> None:
     sheet = tmp_path / "worksheet.csv"
     sheet.write_text(WORKSHEET.replace("30.00", "100.00"), encoding="utf-8")
@@ -373,18 +382,20 @@ def test_refusals(tmp_path: Path) -> None:
     assert not list(out.glob("*.csv"))
 
 
-def test_a_gradebook_with_decimal_commas_is_to_be_downloaded_with_commas_between_cells(tmp_path: Path) -> None:
-    out = batch_in(tmp_path / "out", [grade("ada")])
-    (tmp_path / "book.csv").write_text("Identifier;Full name;Grade;Maximum Grade\nParticipant 501;Ada;;30,00\n")
-    with pytest.raises(InputError, match="longer than its headings; download it in English, with comma as separator"):
-        export(out, "moodle", None, ExportOptions(gradebook=tmp_path / "book.csv"))
-
-
 @given(st.text())
 def test_no_cell_of_a_table_is_a_formula(text: str) -> None:
     (row,) = csv.reader(io.StringIO(csv_text([[text, "x"]]), newline=""))
-    assert not row[0].startswith(("=", "+", "-", "@", "\t", "\r", "\n"))
+    assert not row[0].startswith(("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠"))
     assert row[1] == "x"
+    assert not text.isprintable() or len(text) > MOST or uncell(cell(text)) == text
+
+
+@pytest.mark.parametrize("separator", [";", "\t", "|"])
+def test_a_spreadsheet_of_another_country_finds_no_formula_behind_a_separator(separator: str) -> None:
+    """Which takes `;` for the end of a cell, unless it stands between quotation marks."""
+    text = csv_text([[f"ada{separator}=HYPERLINK(1)", "x"]])
+    (row,) = csv.reader(io.StringIO(text), delimiter=separator)
+    assert row[0].startswith(f"ada{separator}=")
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False, width=32))

@@ -62,6 +62,30 @@ def test_a_folder_called_like_the_assignment_does_not_hide_the_file_beside_it(tm
 
 
 @needs_sandbox
+def test_folders_without_end_are_not_followed(tmp_path: Path) -> None:
+    root = container_in(tmp_path, "gradescope")
+    inner = root / CONTAINERS["gradescope"].submission
+    for _ in range(600):
+        inner /= "d"
+        inner.mkdir()
+    assert json.loads(grade_in("gradescope", root).read_text())["score"] == pytest.approx(9.0)
+
+
+@needs_sandbox
+@pytest.mark.parametrize("platform", SCRIPTS)
+def test_what_was_handed_in_is_not_imported_by_the_grader(platform: str, tmp_path: Path) -> None:
+    """Wherever the platform starts the script."""
+    root = container_in(tmp_path, platform)
+    handed_in = root / CONTAINERS[platform].submission
+    (handed_in / "csv.py").write_text("raise SystemExit('the grader runs what was handed in')")
+    environment = dict(os.environ, PYTHON=sys.executable, AUTOGRADER=str(root), GRADE=str(root))
+    script = SETUPS / platform / SCRIPTS[platform]
+    done = subprocess.run([str(script)], env=environment, cwd=handed_in, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "score" in json.loads((root / "results/results.json").read_text())
+
+
+@needs_sandbox
 def test_what_cannot_be_loaded_costs_no_attempt(tmp_path: Path) -> None:
     data = json.loads(grade_in("prairielearn", container_in(tmp_path, "prairielearn", "def (")).read_text())
     assert data["gradable"] is False and "failed to load" in data["format_errors"][0]

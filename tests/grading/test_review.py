@@ -151,6 +151,16 @@ def test_marks_come_and_go_as_a_table(tmp_path: Path) -> None:
     assert (entry.student, entry.criterion, entry.value, entry.comment) == ("ada", "rms", 7.5, "fine")
 
 
+def test_marks_from_a_german_spreadsheet_and_for_a_name_like_a_formula(tmp_path: Path) -> None:
+    out = made(tmp_path, grade("=1+1"))
+    lines = marks_table(read_finished(out)).decode("utf-8-sig").splitlines()
+    assert lines[1].startswith("'=1+1,rms,,")
+    lines[1] = lines[1].replace("rms,,", "rms,7;5,fine", 1)
+    (tmp_path / "marks.csv").write_text("\n".join(lines).translate(str.maketrans(",;", ";,")))
+    (entry,) = read_marks(tmp_path / "marks.csv", "bob")
+    assert (entry.student, entry.criterion, entry.value, entry.comment) == ("=1+1", "rms", 7.5, "fine")
+
+
 def test_the_best_attempt_counts_with_what_was_said_of_it(tmp_path: Path) -> None:
     first = made(tmp_path / "1", grade("ada", score=1.0, before_penalty=1.0), grade("ben"))
     second = made(tmp_path / "2", grade("ada"))

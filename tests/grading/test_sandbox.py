@@ -270,3 +270,29 @@ def test_a_file_that_imports_matplotlib_finds_it_imported(pool: Pool, written: C
     text = 'import sys\nparams = {"ready": "matplotlib.pyplot" in sys.modules}\n'
     with pool.open(written(text + "import matplotlib.pyplot as plt\n")) as subject:
         assert subject.loaded.params == {"ready": True}
+
+
+AT_HOME = {
+    "a window for pictures": "import matplotlib as m\nm.use('TkAgg')\nfrom matplotlib.pyplot import plot\nplot([1])\n",
+    "an import for experiments": "from rds import Experiment, read_log\ndef plan(of): return Experiment(of)\n",
+    "an import of all": "from rds import *\n",
+}
+
+
+@pytest.mark.parametrize("name", AT_HOME)
+def test_what_a_file_says_for_its_author_s_computer_does_no_harm(
+    name: str, pool: Pool, written: Callable[..., Path]
+) -> None:
+    if "matplotlib" in AT_HOME[name]:
+        pytest.importorskip("matplotlib")
+    with pool.open(written(AT_HOME[name])) as subject:
+        subject.begin_control()
+        assert isinstance(subject.control(0.0, Reference(1.0, 0.0, 0.0), 0.0), float)
+
+
+def test_who_runs_an_experiment_while_the_file_is_loaded_is_told_what_to_do(
+    pool: Pool, written: Callable[..., Path]
+) -> None:
+    text = "from rds import Experiment\nfound = Experiment(controller='p')\n"
+    with pytest.raises(SubmissionError, match=r'line 2.*move what runs experiments under `if __name__ == "__main__"'):
+        pool.open(written(text))

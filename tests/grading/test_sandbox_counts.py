@@ -44,6 +44,7 @@ CRAMMED = {
     "statements": "        " + "total = t * 2; " * 1000,
     "an expression": "        total = " + " + ".join(["t * 2"] * 1000),
     "instructions of no line": "        unplaced()",
+    "a table of lines that was cut": "        untold()",
 }
 UNPLACED = """
 def unplaced():
@@ -51,7 +52,10 @@ def unplaced():
     while n: n -= 1
 count = len(unplaced.__code__.co_code) // 2
 table = bytes(0x80 | 15 << 3 | min(8, count - at) - 1 for at in range(0, count, 8))  # "no location" for up to 8 each
+untold_code = unplaced.__code__.replace(co_linetable=b"", co_exceptiontable=b"")
 unplaced.__code__ = unplaced.__code__.replace(co_linetable=table)
+def untold(): pass
+untold.__code__ = untold_code
 """
 
 
@@ -98,7 +102,6 @@ def test_the_count_is_the_same_on_a_busy_computer(pool: Pool, written: Written) 
         ("import ctypes; ctypes.c_int.from_address(id(0))", "ctypes"),
         ("import os; os.fork()", "os.fork is not allowed"),
         ("import threading; threading.Thread(target=int).start()", NO_THREAD),
-        ("import sys; sys._getframe().f_back.f_trace = None", "sys._getframe is not allowed"),
     ],
 )
 def test_who_reaches_for_the_counter_gets_no_count(attack: str, said: str, pool: Pool, written: Written) -> None:
@@ -161,6 +164,10 @@ def forget():
 # by a way to the counter: what is done before the work, and at every sample
 WAYS = {
     "the trace function of a frame": ("look(getattr(sys._getframe(), 'f_trace', None))", "forget()"),
+    "the trace function of a frame in a run": (
+        "",
+        "sys._getframe().f_back.f_trace = None; sys._getframe().f_trace_lines = False; forget()",
+    ),
     "the frames above it": (
         """
 frame = sys._getframe()
@@ -224,6 +231,25 @@ else: found["raise"] = signal.raise_signal
     "an audit hook": (
         "sys.addaudithook(lambda event, args: work() if event == 'mine' else None)",
         "before = done[0]; sys.audit('mine')\n    if done[0] > before: return min(abs(r.position - y), 1.0), state",
+    ),
+    "an event whose name works when it is looked up": (
+        """
+class Name(str):
+    def __hash__(self):
+        work()
+        return 1
+name = Name()
+""",
+        "before = done[0]; sys.audit('object.__getattr__', None, name)\n"
+        "    if done[0] > before: return min(abs(r.position - y), 1.0), state",
+    ),
+    "a handler that interrupts the count": (
+        """
+import signal
+signal.signal(signal.SIGALRM, lambda number, frame: work())
+""",
+        "before = done[0]; signal.setitimer(signal.ITIMER_REAL, 1e-6)\n    while done[0] == before: pass\n"
+        "    return min(abs(r.position - y), 1.0), state",
     ),
     "another interpreter": (
         """
@@ -293,9 +319,10 @@ def test_no_way_leads_to_the_counter(way: str, pool: Pool, written: Written) -> 
     assert found.refused or (found.events or 0) > 10 * 30, found
 
 
-def test_what_python_itself_asks_frames_for_is_there_while_a_file_is_loaded(pool: Pool, written: Written) -> None:
+def test_what_python_itself_asks_frames_for_is_there(pool: Pool, written: Written) -> None:
     text = """
-import collections, enum, signal, sys, typing, warnings
+import collections, enum, logging, signal, sys, typing, warnings
+logging.basicConfig(filename="log.txt", level=logging.DEBUG, format="%(funcName)s %(message)s")
 frame, names = sys._getframe(), []
 while frame is not None:
     names.append(frame.f_globals["__name__"])
@@ -314,6 +341,9 @@ initial_state = ()
 def control(t, r, y, state, params):
     warnings.warn("another")
     signal.raise_signal(signal.SIGUSR1)
+    logging.debug("a sample")
+    assert open("log.txt").read().startswith("control a sample")
+    Inner = collections.namedtuple("Inner", "a")
     return float(Pair(1.0, Mode.ON).a), state
 """
     found = counts(pool, written(text, ""), samples=3)

@@ -98,6 +98,18 @@ def test_a_circle_that_is_not_gone_round_earns_nothing(name: str, tmp_path: Path
     assert made.status is Status.OK and {"path-hidden", "duration-circle"} <= lost and made.score <= 73.0
 
 
+def test_a_good_law_that_shakes_the_motor_earns_nothing(tmp_path: Path, pool: Pool) -> None:
+    """White noise of ±3 V beside a good law moves the axis little, and its margins not at all."""
+    path = tmp_path / "my_controller.py"
+    solution = (ASSIGNMENTS / "tracking" / "solution.py").read_text()
+    shaking = "\nimport random\n_law = control\n\ndef control(t, r, y, state, params):\n"
+    shaking += "    u, state = _law(t, r, y, state, params)\n    return u + random.Random(t).uniform(-3, 3), state\n"
+    path.write_text(solution + shaking)
+    made = grade(read_assignment(ASSIGNMENTS / "tracking"), path, "ada", pool)
+    assert made.status is Status.OK and made.score == 0.0
+    assert next(each.value for each in made.criteria if each.name == "phase-margin") > 50.0
+
+
 def test_an_acceleration_that_is_not_the_grader_s_costs_points(tmp_path: Path, pool: Pool) -> None:
     path = tmp_path / "my_interpolator.py"
     text = (ASSIGNMENTS / "interpolator" / "solution.py").read_text()

@@ -254,6 +254,8 @@ def test_times_of_the_instructor(tmp_path: Path) -> None:
     assert found["Jose\u0301"].time == datetime(2026, 1, 10, 12, tzinfo=CET)
     assert found["ada"].time == datetime(2026, 1, 10, 13, tzinfo=CET)
     assert found["ben"].time == datetime(2026, 1, 10, 13, tzinfo=UTC)
+    put(tmp_path, {"timestamps.csv": times.replace(",", ";")})  # as a German spreadsheet saves it
+    assert of(tmp_path, zone=CET)["ada"].time == datetime(2026, 1, 10, 13, tzinfo=CET)
 
 
 @pytest.mark.parametrize(
@@ -279,6 +281,50 @@ def test_which_file_of_several(tmp_path: Path) -> None:
     assert "controller.py is graded, and not controller.ipynb" in found["ada"].notes
     assert found["ben"].status is Status.REFUSED and "one.py, two.py" in found["ben"].reason
     assert found["cy"].read() == b"law (1).py"
+
+
+def test_copies_and_older_versions_beside_a_file_do_no_harm(tmp_path: Path) -> None:
+    put(
+        tmp_path,
+        {
+            "ada/controller.py": "new",
+            "ada/old/controller.py": "old",
+            "ben/one.py": "same",
+            "ben/one - Copy.py": "same",
+            "cy/v1/controller.py": "same",
+            "cy/v2/controller.py": "same",
+            "dan/v1/controller.py": "x",
+            "dan/v2/controller.py": "y",
+        },
+    )
+    found = of(tmp_path)
+    assert {name: found[name].read() for name in ("ada", "ben", "cy")} == {"ada": b"new", "ben": b"same", "cy": b"same"}
+    assert "controller.py is graded, and not old/controller.py" in found["ada"].notes
+    assert found["dan"].status is Status.REFUSED and "2 files could be meant" in found["dan"].reason
+
+
+CLASSES = {
+    "folders of students": {"Exercise 1/ada/controller.py": b"a", "Exercise 1/bob/sub/controller.py": b"b"},
+    "one with the right name": {"Exercise 1/ada/controller.py": b"a", "Exercise 1/bob/law.py": b"b"},
+    "in two folders": {"Exercise 1/Submissions/ada/x.py": b"a", "Exercise 1/Submissions/bob/x.py": b"b"},
+    "files of students": {"ps1/ada.py": b"a", "ps1/bob.py": b"b", "ps1/notes.txt": b""},
+    "a table beside them": {"submissions/ada/x.py": b"a", "submissions/bob/controller.py": b"b", "list.xlsx": b""},
+}
+
+
+@pytest.mark.parametrize("files", CLASSES.values(), ids=CLASSES)
+def test_the_folder_around_all_in_a_zip_is_nobody_s(files: dict[str, bytes], tmp_path: Path) -> None:
+    found = of(zipped(tmp_path / "class.zip", files))
+    assert {name: row.read() for name, row in found.items()} == {"ada": b"a", "bob": b"b"}
+
+
+def test_one_student_s_folder_in_a_zip_is_that_student_s(tmp_path: Path) -> None:
+    files = {"ada/controller.py": b"a", "ada/src/helper.py": b"", "ada/tests/try.py": b""}
+    (row,) = of(zipped(tmp_path / "ada.zip", files)).values()
+    assert (row.student, row.read()) == ("ada", b"a")
+    moodle = {f"Ada_501_assignsubmission_file_/{name}.py": name.encode() for name in ("one", "two")}
+    (row,) = of(zipped(tmp_path / "moodle.zip", moodle)).values()
+    assert row.student == "Ada_501" and "2 files could be meant (one.py, two.py)" in row.reason
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
@@ -395,11 +441,12 @@ def test_zips_that_students_hand_in(tmp_path: Path) -> None:
         "nested": own_zip({"inner.zip": own_zip({"controller.py": b"x"})}),
         "broken": b"PK\x03\x04 no zip",
         "empty": own_zip({}),
+        "history": own_zip({"controller.py": b"x", **{f".git/objects/{n:03}": b"" for n in range(MOST_OWN)}}),
     }
     for name, data in handed_in.items():
         (tmp_path / f"{name}.zip").write_bytes(data)
     found = of(tmp_path)
-    assert found["good"].read() == b"x"
+    assert found["good"].read() == found["history"].read() == b"x"
     with pytest.raises(Refusal, match="unpacks to more than"):
         found["large"].read()
     said = {"bomb": "says that it unpacks to", "many": "more than 200", "nested": "another zip", "broken": "not a zip"}

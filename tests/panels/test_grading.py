@@ -30,6 +30,8 @@ def test_a_class_is_graded_and_exported(app: App, open_page: Callable[..., Any])
         folder = app.folder / "handed in" / student
         folder.mkdir(parents=True)
         (folder / "controller.py").write_text(text)
+    # what somebody handed in, in the folder that the page works in: it is no module of the grader's
+    (app.folder / "typer.py").write_text("raise SystemExit('the grader runs what was handed in')")
     page = open_page("Grading")
     page.click('button:text-is("Grade")')
     page.wait_for_selector('.rds-notice:has-text("name the assignment\'s folder")')

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
-from rds.grading.feedback.plain_text import cell
+from rds.grading.feedback.plain_text import cell, csv_line
 from rds.grading.grade import CriterionScore, Grade, Status
 from rds.results.units import heading
 
@@ -39,16 +38,8 @@ def csv_text(rows: Iterable[Sequence[str | float | None]]) -> str:
 
 
 def _csv_lines(rows: Iterable[Sequence[str | float | None]]) -> Iterator[str]:
-    writer = csv.writer(_Handed(), lineterminator="\r\n")
     for row in rows:
-        yield writer.writerow([_cell(value) for value in row])
-
-
-class _Handed:
-    """A file that hands what is written to it back, and keeps nothing."""
-
-    def write(self, text: str) -> str:
-        return text
+        yield csv_line(_cell(value) for value in row)
 
 
 def _row(grade: Grade, criteria: Sequence[CriterionScore]) -> list[str | float | None]:

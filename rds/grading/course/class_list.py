@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.grading.table_text import rows_by_heading
 
 FILE = "class.csv"
 COLUMNS = ("student", "name", "email", "section", "group", "extension_days", "late_days")
@@ -112,7 +113,7 @@ def read_class_list(path: Path) -> ClassList:
         raise InputError(f"cannot be read: {error.strerror}; name the class list", str(path)) from error
     except UnicodeDecodeError as error:
         raise InputError("is no text in UTF-8; save it as CSV UTF-8", str(path)) from error
-    reader = csv.DictReader(io.StringIO(text, newline=""))
+    reader = rows_by_heading(text)
     columns = [name.strip() for name in reader.fieldnames or ()]
     if "student" not in columns or len(set(columns)) < len(columns) or not set(columns) <= set(COLUMNS):
         raise InputError(

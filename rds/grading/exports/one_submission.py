@@ -1,7 +1,7 @@
 """One submission in the container of a platform: graded in the sandbox, answered in the platform's own file.
 
-python -m rds.grading.exports.one_submission gradescope /autograder
-python -m rds.grading.exports.one_submission prairielearn /grade
+python -P -m rds.grading.exports.one_submission gradescope /autograder
+python -P -m rds.grading.exports.one_submission prairielearn /grade
 
 Whatever happens there is a `results.json`. Where the sandbox does not hold, nothing is run, and it says so.
 """
@@ -16,6 +16,7 @@ import stat
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from rds.grading.exports import GRADEBOOKS
 from rds.grading.exports.export import export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.grade import Grade, Status
+from rds.grading.intake.items import DEEPEST
 from rds.grading.intake.layouts import TIMES
 
 RESULTS = "results/results.json"
@@ -83,12 +85,18 @@ def _grade(container: Container, platform: str, root: Path, target: Path) -> Non
     student = student.replace("/", "_") or "student"
     with scratch("one") as work:
         folder = work / "submissions" / student
-        shutil.copytree(root / container.submission, folder, symlinks=True, copy_function=_copied)
+        given = root / container.submission
+        shutil.copytree(given, folder, symlinks=True, copy_function=_copied, ignore=partial(_too_deep, given))
         if time:
             with open_private(work / "submissions" / TIMES, "w", newline="", encoding="utf-8") as stream:
                 csv.writer(stream).writerows([["student", "timestamp"], [student, time]])
         run_batch(root / container.assignment, work / "submissions", work / "out", jobs=1)
         export(work / "out", platform, target, ExportOptions())
+
+
+def _too_deep(given: Path, folder: str, names: list[str]) -> list[str]:
+    """What lies in more folders than are looked into: thousands, one in the other, would end the copying."""
+    return names if len(Path(folder).relative_to(given).parts) > DEEPEST else []
 
 
 def _copied(source: str, target: str) -> None:
@@ -109,7 +117,7 @@ def _answer_failure(platform: str, target: Path, reason: str) -> None:
 def main(arguments: Sequence[str]) -> int:
     """The command; 2 if it is not called as above."""
     if len(arguments) != 2 or arguments[0] not in CONTAINERS:
-        sys.stderr.write(f"usage: python -m rds.grading.exports.one_submission {{{','.join(CONTAINERS)}}} FOLDER\n")
+        sys.stderr.write(f"usage: python -P -m rds.grading.exports.one_submission {{{','.join(CONTAINERS)}}} FOLDER\n")
         return 2
     sys.stderr.write(f"wrote {grade_in(arguments[0], Path(arguments[1]))}\n")
     return 0

@@ -12,6 +12,7 @@ from pathlib import Path
 from rds.core.errors import InputError
 from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import Grade
+from rds.grading.table_text import delimiter
 
 _LARGEST = 64 << 20  # bytes
 _MOST_NAMES = 10
@@ -58,9 +59,8 @@ def read_sheet(path: Path) -> Sheet:
         encoding = "utf-16-le" if data.startswith(_MARK.encode("utf-16-le")) else "utf-8"
         text = data.decode(encoding)
         has_mark, text = text.startswith(_MARK), text.removeprefix(_MARK)
-        head = text.partition("\n")[0]
-        delimiter = "\t" if head.count("\t") > head.count(",") else ","
-        rows = [row for row in csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=delimiter) if any(row)]
+        separator = delimiter(text)
+        rows = [row for row in csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator) if any(row)]
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}; name the gradebook's CSV file", str(path)) from error
     except (UnicodeDecodeError, csv.Error) as error:
@@ -69,9 +69,8 @@ def read_sheet(path: Path) -> Sheet:
         raise InputError("is empty; download it once more", str(path))
     width = len(rows[0])
     if any(len(row) > width and any(row[width:]) for row in rows):
-        remedy = "in English, with comma as separator" if head.count(";") > head.count(",") else "once more"
-        raise InputError(f"has rows that are longer than its headings; download it {remedy}", str(path))
-    return Sheet(rows[0], [(row + [""] * width)[:width] for row in rows[1:]], has_mark, (encoding, delimiter))
+        raise InputError("has rows that are longer than its headings; download it once more", str(path))
+    return Sheet(rows[0], [(row + [""] * width)[:width] for row in rows[1:]], has_mark, (encoding, separator))
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from html import escape
 
 LONGEST = 4000  # characters
-_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
+_SEPARATORS = frozenset(',;|\t\r\n"')  # where a spreadsheet may cut a line, by the country that it is set to
 
 
 def plain(text: str, most: int = LONGEST) -> str:
@@ -31,4 +33,15 @@ def isolated(text: str, most: int = 200) -> str:
 def cell(text: str) -> str:
     """Text for a table that a spreadsheet may open: nothing in it is taken for a formula."""
     text = plain(text)
-    return f"'{text}" if text.startswith(_FORMULA) else text
+    return f"'{text}" if text.lstrip("'").startswith(_FORMULA) else text
+
+
+def uncell(text: str) -> str:
+    """What `cell` was given, of a text without anything that cannot be printed."""
+    return text[1:] if text.startswith("'") and text.lstrip("'").startswith(_FORMULA) else text
+
+
+def csv_line(cells: Iterable[str]) -> str:
+    """A line of CSV that each spreadsheet cuts at the same places, also one that takes `;` for the end of a cell."""
+    quoted = (f'"{each.replace(chr(34), 2 * chr(34))}"' if _SEPARATORS & set(each) else each for each in cells)
+    return ",".join(quoted) + "\r\n"

@@ -44,7 +44,7 @@ def files_in_own(item: Item) -> list[Item]:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except _Broken as error:
         raise Refusal(f"it is not a zip that can be read ({error})") from None
-    entries = archive.infolist()
+    entries = [entry for entry in archive.infolist() if not is_clutter(_parts(entry))]
     if len(entries) > MOST_OWN:
         raise Refusal(f"its zip holds {len(entries)} files, more than {MOST_OWN}; hand in one Python file or notebook")
     unpacked = sum(entry.file_size for entry in entries)
@@ -61,8 +61,7 @@ def _items(archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo]) -> tuple[li
     folders: set[str] = set()
     seen: set[tuple[str, ...]] = set()
     for entry in sorted(entries, key=lambda entry: entry.filename):
-        name = entry.filename.replace("\\", "/")
-        parts = tuple(part for part in name.split("/") if part not in ("", "."))
+        name, parts = entry.filename.replace("\\", "/"), _parts(entry)
         if not parts or is_clutter(parts):
             continue
         if _leads_out(name, parts):
@@ -78,6 +77,10 @@ def _items(archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo]) -> tuple[li
             found.append(Item(parts, partial(_read, archive, entry), _time(entry)))
         seen.add(parts)
     return found, sorted(folders)
+
+
+def _parts(entry: zipfile.ZipInfo) -> tuple[str, ...]:
+    return tuple(part for part in entry.filename.replace("\\", "/").split("/") if part not in ("", "."))
 
 
 def _leads_out(name: str, parts: tuple[str, ...]) -> bool:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from hashlib import sha256
 
 from rds.grading.intake.archives import files_in_own
 from rds.grading.intake.items import Item, Refusal, refusal
 from rds.grading.intake.layouts import StudentFiles
-from rds.grading.intake.names import shown
+from rds.grading.intake.names import shown, without_number
+from rds.grading.intake.notebooks import LARGEST
 
-_AGAIN = re.compile(r"(?P<stem>.+?)(?:-(?P<dash>\d{1,4})| ?\((?P<paren>\d{1,4})\))(?P<end>\.\w+)", re.DOTALL)
+_MOST_COPIES = 20  # files that are compared
 _BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
 
 
@@ -34,12 +35,12 @@ def chosen(handed: StudentFiles, accepted: Sequence[str]) -> Item:
         names = ", ".join(sorted(shown(item.name) for item in files)[:5])
         raise NothingToGrade(f"there is no .py or .ipynb file in what was handed in ({names})")
     outermost = min(len(item.parts) for item in candidates)
-    named = [item for item in candidates if _name(item)[0] in accepted]
+    named = [item for item in candidates if without_number(item.name)[0] in accepted]
     among = named or [item for item in candidates if len(item.parts) == outermost]
     keys = {id(item): _rank(item, handed, accepted) for item in among}
     best = max(keys.values())
     found = [item for item in among if keys[id(item)] == best]
-    if len(found) > 1:
+    if len(found) > 1 and not _are_copies(found):
         names = ", ".join(sorted(shown("/".join(item.parts)) for item in found)[:5])
         raise Refusal(f"{len(found)} files could be meant ({names}); hand in one")
     if len(among) > 1:
@@ -61,15 +62,17 @@ def _with_unpacked(items: Sequence[Item]) -> list[Item]:
     return files
 
 
-def _name(item: Item) -> tuple[str, int]:
-    """A file's name without the number that a platform or browser puts behind it, and the number."""
-    found = _AGAIN.fullmatch(item.name)
-    return (item.name, 0) if found is None else (found["stem"] + found["end"], int(found["dash"] or found["paren"]))
+def _are_copies(items: Sequence[Item]) -> bool:
+    """Whether it does not matter which of them is meant."""
+    try:
+        return len(items) <= _MOST_COPIES and len({sha256(item.read(LARGEST)).digest() for item in items}) == 1
+    except Refusal:
+        return False
 
 
-def _rank(item: Item, handed: StudentFiles, accepted: Sequence[str]) -> tuple[datetime, int, int]:
-    """Newer first; then the number of the attempt; then the better name."""
-    name, number = _name(item)
+def _rank(item: Item, handed: StudentFiles, accepted: Sequence[str]) -> tuple[datetime, int, int, int]:
+    """Newer first; then the number of the attempt; then the better name; then what lies in fewer folders."""
+    name, number = without_number(item.name)
     when = item.time if handed.has_times and item.time is not None else _BEFORE_ALL
     place = accepted.index(name) if name in accepted else len(accepted)
-    return when if when.tzinfo else when.replace(tzinfo=UTC), number, -place
+    return when if when.tzinfo else when.replace(tzinfo=UTC), number, -place, -len(item.parts)

@@ -57,7 +57,7 @@ class Item:
 
 def is_clutter(parts: tuple[str, ...]) -> bool:
     """Whether no person made this file."""
-    return not _CLUTTER.isdisjoint(parts) or parts[-1].startswith("._")
+    return not _CLUTTER.isdisjoint(parts) or (bool(parts) and parts[-1].startswith("._"))
 
 
 def faulty(parts: tuple[str, ...], fault: str, is_unreadable: bool = False) -> Item:

@@ -19,7 +19,7 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.grading.intake.gradescope import METADATA, Submitter, read_metadata
 from rds.grading.intake.items import Item
-from rds.grading.intake.names import shown
+from rds.grading.intake.names import shown, without_number
 
 TIMES = "timestamps.csv"  # of the instructor, at the top
 STAMP = "timestamp.txt"  # of nbgrader, beside a submission
@@ -58,13 +58,19 @@ class Layout:
     ignored: tuple[str, ...] = ()
 
 
-def sorted_out(items: Sequence[Item], folders: Sequence[str], assignments: Sequence[str], zipped: bool) -> Layout:
+def sorted_out(
+    items: Sequence[Item],
+    folders: Sequence[str],
+    assignments: Sequence[str],
+    zipped: bool,
+    accepted: Sequence[str] = (),
+) -> Layout:
     """The files by student. `assignments` are names by which nbgrader may know the assignment.
 
-    `zipped`: whether they are in an export, whose times are the learning platform's. InputError if there are several
-    assignments and none has such a name.
+    `zipped`: whether they are in an export, whose times are the learning platform's. `accepted`: the names that a
+    submission should have. InputError if there are several assignments and none has such a name.
     """
-    items, folders = _without_root(items, folders)
+    items, folders = _without_root(items, folders, zipped, accepted)
     times = next((item for item in items if item.parts == (TIMES,)), None)
     items = [item for item in items if item is not times]
     sorting = _Sorting(zipped)
@@ -236,14 +242,37 @@ class _Sorting:
         handed.items.append(replace(item, parts=item.parts[1:], time=when))
 
 
-def _without_root(items: Sequence[Item], folders: Sequence[str]) -> tuple[list[Item], list[str]]:
-    """Without the one folder around everything that exports and courses have."""
-    while len(folders) == 1 and all(len(item.parts) > 1 for item in items):
-        if not re.fullmatch(r"assignment_\d+_export|submitted|submissions", folders[0]):
+def _without_root(
+    items: Sequence[Item], folders: Sequence[str], zipped: bool, accepted: Sequence[str]
+) -> tuple[list[Item], list[str]]:
+    """Without the one folder around everything that exports and courses have, or who packs a folder into a zip."""
+    while len(folders) == 1 and all(len(item.parts) > 1 for item in items if _is_handed_in(item)):
+        known = re.fullmatch(r"assignment_\d+_export|submitted|submissions", folders[0])
+        is_one_s = bool(_MOODLE_FOLDER.fullmatch(folders[0])) or any(item.parts == (METADATA,) for item in items)
+        if not known and (is_one_s or not zipped or not _is_of_a_class(items, accepted)):
             break
-        items = [replace(item, parts=item.parts[1:]) for item in items]
+        items = [replace(item, parts=item.parts[1:]) if len(item.parts) > 1 else item for item in items]
         folders = sorted({item.parts[0] for item in items if len(item.parts) > 1})
     return list(items), list(folders)
+
+
+def _is_of_a_class(items: Sequence[Item], accepted: Sequence[str]) -> bool:
+    """Whether what lies in one folder is several students': in a folder, or a file, of each of them."""
+    handed_in = [item for item in items if _is_handed_in(item)]
+    if len(handed_in) < 2:
+        return False
+    at = 1  # of the first folder, or file, that they do not share
+    while len({item.parts[:at] for item in handed_in}) == 1 and all(len(item.parts) > at for item in handed_in):
+        at += 1
+    alone = [item.name for item in handed_in if len(item.parts) == at]
+    in_folders = {item.parts[at - 1] for item in handed_in if len(item.parts) > at}
+    is_one_s = any(without_number(name)[0] in accepted for name in alone)
+    return not is_one_s and (len(in_folders) > 1 or len(alone) > 1)
+
+
+def _is_handed_in(item: Item) -> bool:
+    """Whether it may be a submission, or a part of one: not a table or a note beside them."""
+    return item.is_code or item.is_archive or bool(item.fault)
 
 
 def _mostly(items: Sequence[Item], fits: Any) -> bool:

@@ -6,6 +6,7 @@ import hashlib
 import re
 
 _PLAIN = re.compile(r"[a-z0-9][a-z0-9_-]{0,59}")
+_AGAIN = re.compile(r"(?P<stem>.+?)(?:-(?P<dash>\d{1,4})| ?\((?P<paren>\d{1,4})\))(?P<end>\.\w+)", re.DOTALL)
 _RESERVED = re.compile(r"con|prn|aux|nul|com\d|lpt\d")  # that Windows keeps for devices
 _ESCAPED = frozenset("\\\u115f\u1160\u2800\u3164\uffa0")  # the backslash, and what leaves white paper
 _LONGEST = 200  # characters of an identifier that is shown
@@ -34,6 +35,12 @@ def safe_id(student: str) -> str:
         return student
     kept = re.sub(r"[^a-z0-9_]+", "-", student.lower()).strip("-")[:40]
     return f"{kept}~{_digest(student)}"
+
+
+def without_number(name: str) -> tuple[str, int]:
+    """A file's name without the number that a platform or browser puts behind it, and the number."""
+    found = _AGAIN.fullmatch(name)
+    return (name, 0) if found is None else (found["stem"] + found["end"], int(found["dash"] or found["paren"]))
 
 
 def _escaped(character: str) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import unicodedata
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from zoneinfo import ZoneInfo
@@ -11,6 +9,7 @@ from zoneinfo import ZoneInfo
 from rds.core.errors import InputError
 from rds.grading.intake.items import Refusal
 from rds.grading.intake.layouts import STAMP, TIMES, Layout, StudentFiles
+from rds.grading.table_text import rows_by_heading
 
 NOT_UNDERSTOOD = f"its {STAMP} cannot be understood"  # begins a note
 _LARGEST = 4 << 20  # bytes
@@ -30,7 +29,7 @@ def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
         text = layout.times.read(_LARGEST).decode("utf-8-sig")
     except (Refusal, UnicodeDecodeError) as error:
         raise InputError(f"cannot be read: {error}; save it as UTF-8", TIMES) from error
-    reader = csv.DictReader(io.StringIO(text))
+    reader = rows_by_heading(text)
     if not {"student", "timestamp"} <= set(reader.fieldnames or ()):
         raise InputError("must have the columns student and timestamp, with a comma between them", f"{TIMES}: line 1")
     known, found = {handed.student for handed in layout.by_student}, {}

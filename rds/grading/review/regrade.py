@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,7 +17,7 @@ from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.run import BatchOptions, grade_all
 from rds.grading.batch.work import CODE
 from rds.grading.course.class_list import FILE as CLASS
-from rds.grading.feedback.plain_text import cell, one_line
+from rds.grading.feedback.plain_text import cell, csv_line, one_line
 from rds.grading.grade import CriterionScore, Grade, Status
 from rds.grading.intake import HandedIn, Intake
 from rds.grading.intake.folders import read_regular
@@ -146,11 +144,8 @@ def _kept(before: Finished) -> Intake:
 
 
 def _csv(rows: list[list[Any]]) -> bytes:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\r\n")
-    for row in rows:
-        writer.writerow([cell(each) if isinstance(each, str) else f"{each:.9g}" for each in row])
-    return stream.getvalue().encode("utf-8-sig", "replace")
+    lines = (csv_line(cell(each) if isinstance(each, str) else f"{each:.9g}" for each in row) for row in rows)
+    return "".join(lines).encode("utf-8-sig", "replace")
 
 
 def _page(title: str, before: Finished, columns: list[str], rows: list[list[Any]]) -> str:

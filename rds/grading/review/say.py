@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished, read_finished
-from rds.grading.feedback.plain_text import cell
+from rds.grading.feedback.plain_text import cell, csv_line, uncell
 from rds.grading.review.entries import Entry, Kind, add
 from rds.grading.review.publish import assignment_of, publish
+from rds.grading.table_text import rows_by_heading
 
 MARKS = ("student", "criterion", "points", "comment", "why")
 _LARGEST = 64 << 20  # bytes
@@ -58,20 +57,20 @@ def read_marks(path: Path, by: str, is_final: bool = False) -> list[Entry]:
         raise InputError(f"cannot be read: {error.strerror}; name the table of marks", str(path)) from error
     except UnicodeDecodeError as error:
         raise InputError("is no text in UTF-8; save it as CSV UTF-8", str(path)) from error
-    reader = csv.DictReader(io.StringIO(text, newline=""))
+    reader = rows_by_heading(text)
     if not {"student", "criterion"} <= set(reader.fieldnames or ()):
         raise InputError(
             f"must have the columns {', '.join(MARKS)}; --write-marks makes such a table", f"{path}: line 1"
         )
     found = []
     for row in reader:
-        said = {key: (row.get(key) or "").strip() for key in MARKS}
+        said = {key: uncell(row.get(key) or "").strip() for key in MARKS}
         if not (said["points"] or said["comment"] or said["why"]):
             continue
         value = None
         if said["points"]:
             try:
-                value = float(said["points"])
+                value = float(said["points"].replace(",", "."))
             except ValueError:
                 told = f"points = {said['points']!r} is no number"
                 raise InputError(told, f"{path}: line {reader.line_num}") from None
@@ -93,6 +92,4 @@ def marks_table(finished: Finished) -> bytes:
             rows.append(
                 (grade.student, score.name, "", "", "", f"{score.score:g}", f"{score.max_score:g}", value or score.band)
             )
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\r\n").writerows([[cell(each) for each in row] for row in rows])
-    return stream.getvalue().encode("utf-8-sig", "replace")
+    return "".join(csv_line(map(cell, row)) for row in rows).encode("utf-8-sig", "replace")

@@ -173,7 +173,7 @@ class _Batch:
         self._out = out
         with self._claimed() as lock, open_private(self._log, "wb") as log:
             self._child = subprocess.Popen(
-                [sys.executable, "-m", "rds", "grade", *words],
+                [sys.executable, "-P", "-m", "rds", "grade", *words],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=log,  # a pipe that nobody reads would hold it up, and end it with this page
@@ -264,7 +264,7 @@ def _said(words: list[str], pulse: Callable[[], None]) -> str:
     """What a command of `rds grade` says; InputError where it refuses. What `pulse()` raises ends it."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = subprocess.Popen(
-            [sys.executable, "-m", "rds", "grade", *words],
+            [sys.executable, "-P", "-m", "rds", "grade", *words],
             stdin=subprocess.DEVNULL,
             stdout=out,
             stderr=err,

@@ -37,6 +37,7 @@ def main(questions: int, answers: int, door: list[int]) -> int:
     for name, descriptor in (("stdout", 1), ("stderr", 2)):
         vars(sys)[name] = vars(sys)[f"__{name}__"] = _stream(descriptor)
     _seed()
+    _as_at_home()
     try:
         order = channel.ask()
         file = Path(walls.HOME) / order["name"]
@@ -70,6 +71,40 @@ def _seed() -> None:
     random.seed(0)
     np.random.seed(0)
     vars(np.random.bit_generator)["randbits"] = random.Random(0).getrandbits  # where numpy takes its entropy
+
+
+def _as_at_home() -> None:
+    """What a file says for its author's own computer, and none of its functions needs, does no harm here.
+
+    Such is the choice of a window for pictures, and the import of what runs experiments, which is not mounted.
+    """
+    if "matplotlib" in sys.modules:
+        vars(sys.modules["matplotlib"])["use"] = lambda *_, **__: None
+    package = vars(sys.modules["rds"])
+    there = package["__getattr__"]
+
+    def get(name: str) -> Any:
+        try:
+            return there(name)
+        except ModuleNotFoundError as error:
+            return _NotHere(error)
+
+    package["__getattr__"] = get
+
+
+class _NotHere:
+    """In place of what is not mounted: it can be imported, and the error comes where it is used."""
+
+    def __init__(self, error: ImportError):
+        self._error = error
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        raise self._error
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # Python's own questions, such as whether it wraps another
+            raise AttributeError(name)
+        raise self._error
 
 
 def _counted(questions: int, answers: int, order: dict[str, Any] | None) -> Counted | None:
