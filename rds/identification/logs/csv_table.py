@@ -98,7 +98,8 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
         findings.append(missing_samples(layout.announced, rows, "the file announces"))
     if layout.surplus:
         what = f"no cells stand below {', '.join(map(repr, layout.surplus[:8]))} in the heading, which is wider than "
-        findings.append(Finding("headings", what + "the rows; the others were taken from the left"))
+        gravity = Gravity.NOTE if layout.surplus == ("Comment",) else Gravity.WARNING  # LabVIEW's, which is often empty
+        findings.append(Finding("headings", what + "the rows; the others were taken from the left", gravity))
     columns = {}
     for at, (name, unit) in enumerate(zip(names, layout.units, strict=True)):
         if at < layout.beside:
