@@ -11,6 +11,7 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 from rds.core.errors import InputError
@@ -293,7 +294,8 @@ def _of_tektronix(lines: Sequence[str], encoding: str) -> Layout | None:
     ]
     units: list[str | None] = [None] * width
     units[3:5] = settings.get("Horizontal Units") or None, settings.get("Vertical Units") or None
-    announced = int(float(settings["Record Length"]))
+    length = float(rows[0][1])
+    announced = int(length) if isfinite(length) else None
     words = frozenset((0, 1))
     return Layout(encoding, ",", ".", first, tuple(names), tuple(units), words, {}, announced, beside=3)
 
