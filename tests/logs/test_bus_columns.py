@@ -102,6 +102,8 @@ def test_a_log_without_frames_says_so(tmp_path: Path) -> None:
             "{us},{id:08X},false,Rx,0,8,{bytes},",
         ),
         ("old.csv", "Time Stamp,ID,Extended,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8", "{us},{id:08X},false,0,8,{bytes},"),
+        ("candump.txt", "(0.000000) can0 7FF#00", "({s:.6f}) can0 {id:03X}#{hex}"),
+        ("shown.txt", " (0.000000)  can0  7FF   [1]  00", " ({s:.6f})  can0  {id:03X}   [8]  {blanks}"),
         ("microchip.can", "//---------------------------------", "{ms};RX;{id:#x};8;{semicolons};;;;;;;;;"),
     ],
 )
@@ -111,7 +113,14 @@ def test_logs_of_other_tools_become_columns(name: str, head: str, line: str, tmp
         cells = [f"{byte:02X}" for byte in data]
         lines.append(
             line.format(
-                us=round(t * 1e6), ms=f"{t * 1e3:.3f}", id=identifier, bytes=",".join(cells), semicolons=";".join(cells)
+                us=round(t * 1e6),
+                ms=f"{t * 1e3:.3f}",
+                s=t,
+                id=identifier,
+                bytes=",".join(cells),
+                semicolons=";".join(cells),
+                blanks=" ".join(cells),
+                hex="".join(cells),
             )
         )
     (tmp_path / name).write_text("\n".join(lines) + "\n")

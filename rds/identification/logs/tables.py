@@ -49,7 +49,10 @@ _EXPORTS = {
     **dict.fromkeys((".isf", ".wfm", ".bin", ".psdata"), "an oscilloscope's own: save its channels as CSV"),
     ".fig": "a figure of MATLAB: save the vectors that it shows as a MAT file",
 }
-_BUS_CSV = re.compile(rb"timestamp,arbitration_id,|time ?stamp,\s*id,\s*extended,", re.IGNORECASE)
+_OF_BUS = re.compile(
+    rb"timestamp,arbitration_id,|time ?stamp,\s*id,\s*extended,|\s*\([\d. :-]{3,30}\)\s+\S+\s+[\dA-F]+(?:#|\s+\[)",
+    re.IGNORECASE,
+)
 
 
 def read_table(
@@ -84,7 +87,7 @@ def read_table(
                 raise InputError(f"{what}; nor is it a log of frames, as `candump -L` writes", error.where) from error
         elif ending == ".mdf":
             raise InputError("it is no MDF file with measurements; let the name of a bus log end in .mf4")
-        elif ending in BUSES or ending == ".gz" or (ending in TEXTS and _is_bus_csv(path)):
+        elif ending in BUSES or ending == ".gz" or (ending in TEXTS and _is_of_bus(path)):
             from rds.identification.logs.can_table import read_can
 
             table = read_can(path, dbc, progress)
@@ -120,7 +123,7 @@ def _is_of_frames(path: Path) -> bool:
     return is_of_frames(path)
 
 
-def _is_bus_csv(path: Path) -> bool:
-    """Whether a CSV file is python-can's, or SavvyCAN's and GVRET's."""
+def _is_of_bus(path: Path) -> bool:
+    """Whether a text is python-can's CSV, SavvyCAN's and GVRET's, or candump's by another name."""
     with open(path, "rb") as stream:
-        return _BUS_CSV.match(stream.read(60).removeprefix(codecs.BOM_UTF8)) is not None
+        return _OF_BUS.match(stream.read(60).removeprefix(codecs.BOM_UTF8)) is not None
