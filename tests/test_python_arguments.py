@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import rds
+from rds.cli.main import app
 from rds.machines.machine import load_machine as loaded
 from rds.nc import Setup
 from rds.nc.language.dialect import Dialect
@@ -30,6 +33,17 @@ def interpolate(segment, T, params):
         at = tuple(a + (b - a) * i / k for a, b in zip(segment.start, segment.end))
         rest = (0.0,) * len(at)
         yield at, rest, rest
+"""
+
+
+LOOP = """axis = "X"
+duration = 1.0
+sample_period = 0.005
+[reference]
+kind = "constant"
+value = 0.0
+[controller]
+name = "pid"
 """
 
 
@@ -174,3 +188,33 @@ def test_what_is_not_what_it_should_be_is_named(fitted: tuple[rds.Log, Any]) -> 
             do()
     assert rds.verdict("xyzac").ok
     assert rds.structure("axis", "viscous").options == ("viscous",)
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "theirs"),
+    [
+        ("fit run --structure axis -o", "x.toml", 'axis = "X"\n'),
+        ("design tracking fitted.toml --out", "law.py", LAW),
+        ("design lqg loop.toml --delay 0.004 --out", "loop.toml", LOOP),
+        ("machine from fitted.toml --axis X --out", "m.toml", "[axis.X]\nnode = 2\n"),
+        ("excite mini-cnc -o", "test.toml", 'axis = "X"\n'),
+    ],
+)
+def test_a_command_takes_the_place_of_its_own_file_only(
+    command: str, name: str, theirs: str, fitted: tuple[rds.Log, Any], here: Path
+) -> None:
+    log, estimate = fitted
+    rds.write_model("fitted.toml", estimate)
+    (here / "loop.toml").write_text(LOOP)
+    shutil.copytree(log.source, "run")
+    words = [*command.split(), name]
+    (here / name).write_text(theirs)
+    refused = CliRunner().invoke(app, words)
+    assert refused.exit_code == 2 and f"{name}: there is another file already" in refused.stderr
+    assert (here / name).read_text() == theirs
+    if "loop.toml" in words[:-1]:
+        words[-1] = "other.toml"
+    (here / words[-1]).unlink(missing_ok=True)
+    for _ in range(2):
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 0, done.output

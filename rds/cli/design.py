@@ -74,15 +74,17 @@ def lqg(
 ) -> None:
     """LQG control for a loop with a known delay, its gains and its margins against delay and jitter."""
     with refusals():
-        from rds.core.atomic import write_whole
+        from rds.core.atomic import keep_another, write_whole
         from rds.core.errors import InputError
         from rds.modes.experiment.experiment import Experiment
         from rds.network.delays import Delay
-        from rds.network.loops.design import design_lqg
+        from rds.network.loops.design import LQG, design_lqg
         from rds.network.trace import read_total
 
         if delay is not None and delays is not None:
             raise InputError("give one of --delay and --delays")
+        if out is not None:
+            keep_another(out, LQG, "controller of `rds design lqg`")
         known = None if delay is None else Delay.named("constant", delay=delay)
         known = known if delays is None else Delay.recorded(read_total(delays))
         designed = design_lqg(Experiment.from_toml(experiment), known, axis)

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from rds.identification.fit.excitation import Design, Prediction, Task
     from rds.machines.machine import Machine
 
+_MARK = "Designed by `rds excite`"  # how the experiment's file begins
+
 
 @writes_files
 def excite(
@@ -33,7 +35,7 @@ def excite(
 ) -> None:
     """Find the voltage, within travel and voltage, that tells time constant, gain and friction best."""
     with refusals(), stdout_kept(json):
-        from rds.core.atomic import write_files
+        from rds.core.atomic import keep_another, write_files
         from rds.core.errors import InputError
         from rds.identification.fit.excitation import KINDS, design
         from rds.machines import load_machine
@@ -41,6 +43,8 @@ def excite(
         for path, suffix in ((out, ".toml"), (plot, ".png")):
             if path is not None and path.suffix != suffix:
                 raise InputError(f"give it a name that ends in {suffix}", str(path))
+        if out is not None:
+            keep_another(out, _MARK, "experiment of `rds excite`")
         loaded = load_machine(machine)
         task = _task(loaded, axis or next(iter(loaded.axes)), model, duration, noise)
         with progress_bars() as bar:
@@ -116,7 +120,7 @@ def _experiment(found: Design, machine: str) -> str:
     }
     return toml_text(
         table,
-        f"Designed by `rds excite` for what is known of {task.axis.name}. Standard errors predicted for a fit of the "
+        f"{_MARK} for what is known of {task.axis.name}. Standard errors predicted for a fit of the "
         f"free run:\n{errors}; from rest at 0 it uses {_span(best, task)}.",
     )
 

@@ -64,14 +64,14 @@ def fit(
     fails.
     """
     with refusals(), stdout_kept(json):
-        from rds.core.errors import InputError
         from rds.identification.fit.fit import fit as fit_model
         from rds.identification.fit.missing_options import with_hint
+        from rds.identification.fit.model_file import check_place
         from rds.identification.structures.structures import for_logs
         from rds.identification.structures.structures import structure as structure_of
 
-        if out is not None and out.suffix != ".toml":
-            raise InputError("a model file is TOML; give it a name that ends in .toml", str(out))
+        if out is not None:  # before the fit, which may take a while
+            check_place(out)
         made = structure_of(structure, option or ())
         options = _options(made, method, fix or [], free, start or [], set_ or [])
         with progress_bars() as bar:

@@ -11,6 +11,8 @@ from typing import BinaryIO, cast
 from rds.core.errors import InputError
 from rds.core.private_files import make_folder, open_private
 
+_HEAD = 2000  # bytes
+
 
 def write_files(writers: Mapping[Path, Callable[[BinaryIO], None]]) -> None:
     """Let each writer fill the file at its path; the files appear complete, together, or not at all.
@@ -51,6 +53,17 @@ def write_whole(path: Path, data: bytes) -> Path:
 
     write_files({path: write})
     return path
+
+
+def keep_another(path: Path, mark: str, what: str) -> None:
+    """InputError if what is at `path` would be lost, as it is no `what`: those have `mark` in their first lines."""
+    try:
+        with open(path, "rb") as stream:
+            head = stream.read(_HEAD)
+    except OSError:  # there is none, or writing tells
+        return
+    if head.strip() and mark.encode() not in head:
+        raise InputError(f"there is another file already, no {what}; name another one, or remove it", str(path))
 
 
 def _sync_directory(directory: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.controllers import tracking
-from rds.core.atomic import write_whole
+from rds.core.atomic import keep_another, write_whole
 from rds.core.errors import InputError
 from rds.core.types import Controller
 from rds.identification.fit.estimate import Estimate
@@ -141,6 +141,7 @@ def write_tracking(path: str | Path, model: Linear | ModelFile | Estimate | str 
     path = Path(path)
     if path.suffix != ".py":
         raise InputError("a controller is a Python file; give it a name that ends in .py", str(path))
+    keep_another(path, "Tracking control designed for", "designed controller")
     axis = linear_axis_of(model)
     made = design_tracking(model, **options)
     period, limit = options.get("sample_period", 0.001), options.get("voltage_range", 10.0)

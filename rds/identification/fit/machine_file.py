@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from rds.core.atomic import write_whole
+from rds.core.atomic import keep_another, write_whole
 from rds.core.errors import InputError
 from rds.core.toml_file import read_toml
 from rds.core.toml_text import toml_text
@@ -49,6 +49,7 @@ def write_machine(
     path = Path(path)
     if path.suffix != ".toml":
         raise InputError("a machine file is TOML; give it a name that ends in .toml", str(path))
+    keep_another(path, "as estimated: ", "machine of a model file")
     file = model if isinstance(model, ModelFile) else read_model(model)
     if file.is_student:
         raise InputError(

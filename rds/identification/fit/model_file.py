@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.atomic import write_whole
+from rds.core.atomic import keep_another, write_whole
 from rds.core.errors import InputError
 from rds.core.installed import version
 from rds.core.quantities import AnyValue, Declaration, Items, Quantity, Table, Tables, Text
@@ -32,12 +32,13 @@ from rds.identification.structures.signals import VOLTS
 from rds.identification.structures.structures import LIBRARY
 
 FORMAT = 1
+MARK = "A model of an axis and how far to trust it"  # how each model file begins
 _SPREAD = ("std_error", "low", "high")
 _ERRORS = ("fit_percent", "rmse", "maximum")
 _LOG_TEXTS = ("name", "source", "sha256", "fingerprint", "trace")
 _LOG_RANGES = ("command", "velocity", "position")  # lowest and highest that occurred
 _HEADER = (
-    "A model of an axis and how far to trust it, estimated from logged data.\n"
+    f"{MARK}, estimated from logged data.\n"
     'An experiment takes it with `[model]` and `file = "..."` (the name of this file).'
 )
 
@@ -91,16 +92,22 @@ class ModelFile:
         return tuple(dict.fromkeys(str(log["sha256"]) for log in self.logs if log.get("sha256")))
 
 
+def check_place(path: Path) -> None:
+    """InputError for a path at which no model file can stand, or another file does."""
+    if path.suffix != ".toml":
+        raise InputError("a model file is TOML; give it a name that ends in .toml", str(path))
+    keep_another(path, MARK, "model file")
+
+
 def write_model(path: str | Path, estimate: Estimate) -> Path:
     """Write what a fit found as a model file at `path`, whole or not at all.
 
     Entries of `estimate.logs` may hold, beside name, source, sha256, first and end, the lowest and highest `command`
-    (V) and `velocity` (mm/s) that occurred. Raises InputError for a path that cannot be written, or a student's
-    structure whose file is gone.
+    (V) and `velocity` (mm/s) that occurred. Raises InputError for a path that cannot be written or where another file
+    is, and for a student's structure whose file is gone.
     """
     path = Path(path)
-    if path.suffix != ".toml":
-        raise InputError("a model file is TOML; give it a name that ends in .toml", str(path))
+    check_place(path)
     return write_whole(path, model_text(estimate, path).encode())
 
 

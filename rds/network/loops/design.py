@@ -24,6 +24,8 @@ from rds.network.margins import Margins, margins
 if TYPE_CHECKING:
     from rds.core.figure import Picture
 
+LQG = "Designed by `rds design lqg`"  # how the table's file begins
+
 
 @dataclass(frozen=True)
 class Designed:
@@ -49,7 +51,7 @@ class Designed:
 
     def table(self) -> str:
         """The [controller] table of an experiment file."""
-        return toml_text({"controller": {"name": "lqg", **self.options}}).lstrip()
+        return toml_text({"controller": {"name": "lqg", **self.options}}, f"{LQG}.").lstrip()
 
     def to_json(self) -> dict[str, Any]:
         """Plain values for json.dumps."""
