@@ -198,6 +198,7 @@ def test_what_is_not_what_it_should_be_is_named(fitted: tuple[rds.Log, Any]) -> 
         ("design lqg loop.toml --delay 0.004 --out", "loop.toml", LOOP),
         ("machine from fitted.toml --axis X --out", "m.toml", "[axis.X]\nnode = 2\n"),
         ("excite mini-cnc -o", "test.toml", 'axis = "X"\n'),
+        ("nc make line --start 0,0 --end 2,1 -f 100 -o", "part.ngc", "G21 G90\nM2\n"),
     ],
 )
 def test_a_command_takes_the_place_of_its_own_file_only(

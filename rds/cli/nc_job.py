@@ -79,11 +79,12 @@ def _layers(file: Path, unit: str | None) -> dict[str, Any]:
 
 
 def _made(file: Path, out: Path, decimals: int) -> dict[str, Any]:
-    from rds.core.atomic import write_files
+    from rds.core.atomic import keep_another, write_files
     from rds.nc.machining.job import read_job
     from rds.nc.paths.measure import total_length
 
     job = read_job(file)
+    keep_another(out, "(operation 1: ", "program of `rds nc make job`")
     text = job.program(decimals).encode()
     writers: dict[Path, Callable[[BinaryIO], Any]] = {out: lambda stream: stream.write(text)}
     write_files(writers)

@@ -64,7 +64,7 @@ def written(
 ) -> None:
     """Write what `make` makes as a part program, perhaps with a picture (both or none), and tell of it."""
     with refusals():
-        from rds.core.atomic import write_files
+        from rds.core.atomic import keep_another, write_files
         from rds.core.errors import InputError
         from rds.nc.paths.measure import summary
         from rds.nc.paths.program import part_program
@@ -75,6 +75,7 @@ def written(
             made = make()
         if made.source is not None and out.exists() and out.samefile(made.source):
             raise InputError("is the file to read from; write the part program to another one", str(out))
+        keep_another(out, "rds nc make", "program of `rds nc make`")
         title = f"rds nc make: {made.said}"
         if made.more.get("deviation_mm"):
             title += f"\ndeviation {made.more['deviation_mm']:.4f} mm"
