@@ -108,7 +108,8 @@ def test_a_table_of_answers_is_told(tmp_path: Path) -> None:
         solution.write_text(solution.read_text() + law)
         assignment = read_assignment(folder)
         reference = grade(assignment, solution, "student 1", TrustedFiles())
-        _, notes = audit(assignment, TrustedFiles(), reference)
+        faults, notes = audit(assignment, TrustedFiles(), reference)
+        assert not any("notebook" in said for said in faults), "a notebook keeps functions that are tested"
         assert len([said for said in notes if said.startswith("double():")]) == count
 
 

@@ -163,7 +163,7 @@ def audit(
         wrapped = _WRAPPED.format(before=before.format(**axis), after=after.format(**axis))
         faults += tried.zeroed(f"the reference solution with {name}", text + wrapped, reference)
     faults += tried.zeroed("the reference solution in a class", text + _IN_A_CLASS, reference)
-    faults += tried.zeroed("the reference solution in a notebook", in_a_notebook(text), reference)
+    faults += tried.zeroed("the reference solution in a notebook", in_a_notebook(text, tried.names()), reference)
     if "K" in axis:
         for name, law in _TEXTBOOK.items():
             faults += tried.gated(name, law.format(**axis))

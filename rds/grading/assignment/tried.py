@@ -14,6 +14,7 @@ from rds.grading.cases.case import LINEAR, CaseRun
 from rds.grading.cases.segment import SegmentCase
 from rds.grading.criteria.criterion import Criterion
 from rds.grading.grade import Band, Grade
+from rds.grading.intake.single import wanted
 
 DECIDES = 20  # samples after which a cheat knows the case by its reference
 _MOST = 1 / 3  # of all points: what students see may be known by heart, and must not pay more
@@ -88,6 +89,10 @@ class Tried:
             for each in timed
             if scores[each.name].score
         ]
+
+    def names(self) -> tuple[str, ...]:
+        """What is kept of a notebook."""
+        return wanted(self._assignment)
 
     def segments(self) -> Iterator[tuple[str, Segment]]:
         """The segment of each case, by the case's name."""
