@@ -50,9 +50,8 @@ def _by_attempt(items: Sequence[Item]) -> dict[tuple[str, Any], list[Item]]:
     if all(item.attempt for item in handed_in):
         for item in items:
             found.setdefault((item.attempt, _with_zone(item.time)), []).append(item)
-    else:
-        at = _version_at(handed_in)
-        for item in items if at is not None else ():
+    elif (at := _version_at(handed_in)) is not None:
+        for item in items:
             match = _VERSION.fullmatch(item.parts[at]) if len(item.parts) > at else None
             if match:
                 found.setdefault((match[0], int(match[1])), []).append(item)
