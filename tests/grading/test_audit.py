@@ -27,6 +27,18 @@ unit = "°"
 GATE = 'requires = ["margin"]\n'
 
 
+SMOOTH = """
+[[criterion]]
+name = "smooth"
+kind = "noise-voltage"
+case = "sine"
+points = 5
+full = 0.8
+none = 1.5
+unit = "V"
+"""
+
+
 def found_in(folder: Path, text: str) -> tuple[list[str], list[str]]:
     assignment = read_assignment(assignment_in(folder, text.replace("duration = 1.0", "duration = 0.5")))
     reference = grade(assignment, folder / "solution.py", "student 1", TrustedFiles())
@@ -38,7 +50,25 @@ def test_margins_in_one_case_only_pay_a_relay_in_the_other(tmp_path: Path) -> No
     faults, _ = found_in(tmp_path, HEAD + SINE + STEP + RMS + GATE + MARGIN.format(cases='"step"'))
     assert len(faults) == 1 and faults[0].startswith("rms: switching where no margin is measured")
     faults, notes = found_in(tmp_path, HEAD + SINE + STEP + RMS + GATE + MARGIN.format(cases='"step", "sine"'))
+    assert not faults and len(notes) == 1 and "with white noise of 20 % of the limit earns" in notes[0]
+
+
+def test_a_law_that_shakes_the_motor_is_told_where_it_is_paid(tmp_path: Path) -> None:
+    text = HEAD + SINE + RMS + GATE + MARGIN.format(cases='"sine"') + SMOOTH
+    faults, notes = found_in(tmp_path / "loose", text)
+    assert not faults and len(notes) == 1 and notes[0].endswith("noise-voltage, which such a law does not pass: rms")
+    faults, notes = found_in(tmp_path / "gated", text.replace(GATE, 'requires = ["margin", "smooth"]\n'))
     assert not faults and not notes
+
+
+def test_a_gate_that_no_textbook_law_passes_is_a_fault(tmp_path: Path) -> None:
+    tight = SMOOTH.replace("0.8", "0.02").replace("1.5", "0.03")
+    text = HEAD + SINE + RMS.replace("0.05", "0.3") + 'requires = ["smooth"]\n' + tight
+    assignment = read_assignment(assignment_in(tmp_path, text))
+    reference = grade(assignment, tmp_path / "solution.py", "student 1", TrustedFiles())
+    assert any(
+        "smooth: an honest design earns nothing" in said for said in audit(assignment, TrustedFiles(), reference)[0]
+    )
 
 
 def test_a_relay_is_paid_where_nothing_requires_the_margin(tmp_path: Path) -> None:
@@ -78,7 +108,8 @@ def test_a_table_of_answers_is_told(tmp_path: Path) -> None:
         solution.write_text(solution.read_text() + law)
         assignment = read_assignment(folder)
         reference = grade(assignment, solution, "student 1", TrustedFiles())
-        _, notes = audit(assignment, TrustedFiles(), reference)
+        faults, notes = audit(assignment, TrustedFiles(), reference)
+        assert not any("notebook" in said for said in faults), "a notebook keeps functions that are tested"
         assert len([said for said in notes if said.startswith("double():")]) == count
 
 

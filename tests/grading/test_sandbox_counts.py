@@ -96,8 +96,8 @@ def test_the_count_is_the_same_on_a_busy_computer(pool: Pool, written: Written) 
 @pytest.mark.parametrize(
     ("attack", "said"),
     [
-        ("import sys; sys.settrace(None)", "sys.settrace is not allowed"),
-        ("import sys; sys.setprofile(None)", "sys.setprofile is not allowed"),
+        ("import sys; sys.settrace(print)", "sys.settrace is not allowed"),
+        ("import sys; sys.setprofile(print)", "sys.setprofile is not allowed"),
         ("import gc; gc.get_objects()", "gc.get_objects is not allowed"),
         ("import ctypes; ctypes.c_int.from_address(id(0))", "ctypes"),
         ("import os; os.fork()", "os.fork is not allowed"),
@@ -348,6 +348,17 @@ def control(t, r, y, state, params):
 """
     found = counts(pool, written(text, ""), samples=3)
     assert found.events and not found.refused
+
+
+def test_who_takes_away_what_is_not_seen_is_counted_all_the_same(pool: Pool, written: Written) -> None:
+    """As doctest does, which puts back what `sys.gettrace` has said."""
+    plain = WORK.replace("ROUNDS", "10")
+    text = plain.replace("    total = 0.0\n", "    total = 0.0\n    sys.settrace(None), sys.setprofile(None)\n")
+    found = counts(pool, written(f"import sys\n{text}", ""), samples=10)
+    assert (found.events or 0) >= (counts(pool, written(plain, ""), samples=10).events or 0) > 10 * 10 * 2
+    tested = 'import doctest\ndef twice(x):\n    """\n    >>> twice(2)\n    4\n    """\n    return 2 * x\n'
+    tested += "doctest.testmod()\ndoctest.run_docstring_examples(twice, globals())\n"
+    assert counts(pool, written(plain + tested, ""), samples=10) == counts(pool, written(plain, ""), samples=10)
 
 
 def test_a_file_that_cannot_be_loaded_while_it_is_counted_is_told_why(pool: Pool, written: Written) -> None:

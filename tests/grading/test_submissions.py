@@ -90,7 +90,7 @@ def test_the_time_that_nbgrader_wrote_is_read_in_its_zone(stamp: str, hour: int 
     tree = {"ada/ps1/controller.py": "a", "ada/ps1/timestamp.txt": stamp, "ben/ps1/controller.py": "b"}
     ada = of(put(tmp_path, tree), assignments=("ps1",))["ada"]
     if hour is None:
-        assert ada.time is None and ada.notes[0].startswith("its timestamp.txt cannot be understood")
+        assert ada.time is None and "cannot be understood" in ada.notes[0] and "timestamp.txt" in ada.notes[0]
     else:
         assert ada.time is not None and ada.time.astimezone(UTC).hour == hour
 
@@ -186,9 +186,62 @@ def test_blackboard_s_zip_has_the_newest_attempt_of_each_student(tmp_path: Path)
     found = of(zipped(tmp_path / "all.zip", files))
     assert list(found) == ["ada", "ben", "cy"]
     assert found["ada"].read() == b"second" and found["ada"].time == datetime(2026, 1, 10, 10, tzinfo=UTC)
-    assert "2026-01-10-10-00-00/controller.py is graded, and not 2026-01-09-10-00-00/" in found["ada"].notes[0]
+    assert "the newest is graded (2026-01-10-10-00-00), and not 2026-01-09-10-00-00" in found["ada"].notes[0]
     assert found["ben"].read() == b"ben's own"
     assert found["cy"].status is Status.MISSING
+
+
+def test_the_newest_attempt_counts_whatever_its_file_is_called(tmp_path: Path) -> None:
+    inner = zipped(tmp_path / "inner.zip", {"controller.py": "second"}).read_bytes()
+    files: dict[str, str | bytes] = {
+        "Task 1_ada_attempt_2026-01-09-10-00-00_controller.py": "first",
+        "Task 1_ada_attempt_2026-01-10-10-00-00_law.py": "second",
+        "Task 1_ben_attempt_2026-01-09-10-00-00_controller.py": "first",
+        "Task 1_ben_attempt_2026-01-10-10-00-00_all.zip": inner,
+        "Task 1_cy_attempt_2026-01-09-10-00-00_controller.py": "second",
+        "Task 1_cy_attempt_2026-01-10-10-00-00_report.pdf": "",
+    }
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert [found[name].read() for name in ("ada", "ben", "cy")] == [b"second"] * 3
+    assert found["cy"].notes == (
+        "there is no .py, .ipynb or .zip in the attempt 2026-01-10-10-00-00, and so it does not count",
+    )
+
+
+@pytest.mark.parametrize("form", ["{}/{}", "{} - {}"])
+def test_brightspace_s_download_has_the_newest_attempt_of_each_student(form: str, tmp_path: Path) -> None:
+    handed_in = {
+        ("111-67890 - Ada Lovelace - Jan 9, 2026 1012 AM", "controller.py"): "first",
+        ("111-67890 - Ada Lovelace - Jan 10, 2026 112 PM", "law.py"): "second",
+        ("112-67890 - Ben - 9 January, 2026 942 PM", "controller.py"): "day first",
+        ("113-67890 - Ben - Jan 9, 2026 1012", "controller.py"): "another Ben",
+        ("114-67890 - Cy - 9 janv. 2026 1012", "controller.py"): "one",
+        ("114-67890 - Cy - 9 févr. 2026 1012", "controller.py"): "two",
+    }
+    files: dict[str, str | bytes] = {form.format(*where): text for where, text in handed_in.items()}
+    intake = collect(zipped(tmp_path / "all.zip", files | {"index.html": "<p>"}), ACCEPTED, zone=CET)
+    found = rows(intake)
+    assert list(found) == ["Ada Lovelace_111", "Ben_112", "Ben_113", "Cy_114"] and intake.ignored == ("index.html",)
+    ada = found["Ada Lovelace_111"]
+    assert ada.read() == b"second" and ada.time == datetime(2026, 1, 10, 13, 12, tzinfo=CET)
+    assert "(Jan 10, 2026 112 PM), and not Jan 9, 2026 1012 AM" in ada.notes[0]
+    assert found["Ben_112"].time == datetime(2026, 1, 9, 21, 42, tzinfo=CET)
+    assert "another number (112) has the same name" in found["Ben_113"].notes[0]
+    assert found["Cy_114"].status is Status.REFUSED and "2 attempts" in found["Cy_114"].reason
+    assert "cannot be understood ('9 févr. 2026 1012')" in found["Cy_114"].notes[0]
+
+
+@pytest.mark.parametrize("around", ["", "Submitted files/", "Student Work/Submitted files/"])
+@pytest.mark.parametrize("others", [{"Ben/Task/Version 1/controller.py": "only"}, {}])
+def test_the_last_version_of_teams_counts(around: str, others: dict[str, str], tmp_path: Path) -> None:
+    versions = {"Version 2/controller.py": "second", "Version 10/law.py": "tenth", "Version 11/report.pdf": ""}
+    files = {f"Ada/Task/{name}": text for name, text in versions.items()} | others
+    put(tmp_path / "in", {around + name: text for name, text in files.items()})
+    packed = zipped(tmp_path / "all.zip", {around + name: text.encode() for name, text in files.items()})
+    for place in (tmp_path / "in", packed):
+        found = of(place)
+        assert list(found) == ["Ada", "Ben"][: 1 + len(others)]
+        assert found["Ada"].read() == b"tenth" and any("and not Version 2" in note for note in found["Ada"].notes)
 
 
 def test_blackboard_s_users_with_one_ending_are_kept_apart(tmp_path: Path) -> None:
@@ -322,9 +375,22 @@ def test_one_student_s_folder_in_a_zip_is_that_student_s(tmp_path: Path) -> None
     files = {"ada/controller.py": b"a", "ada/src/helper.py": b"", "ada/tests/try.py": b""}
     (row,) = of(zipped(tmp_path / "ada.zip", files)).values()
     assert (row.student, row.read()) == ("ada", b"a")
+    parts = {"ada/src/controller.py": b"a", "ada/tests/try.py": b""}
+    (row,) = of(zipped(tmp_path / "parts.zip", parts)).values()
+    assert (row.student, row.read()) == ("ada", b"a")
     moodle = {f"Ada_501_assignsubmission_file_/{name}.py": name.encode() for name in ("one", "two")}
     (row,) = of(zipped(tmp_path / "moodle.zip", moodle)).values()
     assert row.student == "Ada_501" and "2 files could be meant (one.py, two.py)" in row.reason
+
+
+def test_folders_that_may_be_one_student_s_are_told(tmp_path: Path) -> None:
+    for number, files in enumerate(
+        ({"src/a.py": b"", "tests/b.py": b""}, {"ada/first/a.py": b"", "ada/second/b.py": b""})
+    ):
+        found = of(zipped(tmp_path / f"{number}.zip", files))
+        assert len(found) == 2 and all("is taken for a student" in row.notes[0] for row in found.values())
+    put(tmp_path / "in", {"ada/a.py": "", "ben/b.py": ""})
+    assert all(not row.notes for row in of(tmp_path / "in").values())
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 The honest ones are the reference solution as students would build it (rounded, with a dead band, in a class, ...), and
 designs of textbooks for the axis of the first case. The cheats switch from limit to limit everywhere, or do so, or
-nothing, only where no margin is measured.
+nothing, only where no margin is measured; one shakes the motor beside a good law, which no margin shows.
 """
 
 from __future__ import annotations
@@ -120,6 +120,8 @@ def control(t, r, y, state, params):
     return r.velocity / params["K"] + params["reach"] * max(-1.0, min(1.0, s / params["layer"])), [y, speed]
 """,
 }
+# More than ±20 % of the limit would be taken for switching. It is the same noise when the work is counted.
+_SHAKING = ("import random", "u += random.Random(t).uniform(-0.2, 0.2) * {limit}")
 _RELAY = """
 def control(t, r, y, state, params):
     return ({limit} if r.position > y else -{limit}), state
@@ -161,7 +163,7 @@ def audit(
         wrapped = _WRAPPED.format(before=before.format(**axis), after=after.format(**axis))
         faults += tried.zeroed(f"the reference solution with {name}", text + wrapped, reference)
     faults += tried.zeroed("the reference solution in a class", text + _IN_A_CLASS, reference)
-    faults += tried.zeroed("the reference solution in a notebook", in_a_notebook(text), reference)
+    faults += tried.zeroed("the reference solution in a notebook", in_a_notebook(text, tried.names()), reference)
     if "K" in axis:
         for name, law in _TEXTBOOK.items():
             faults += tried.gated(name, law.format(**axis))
@@ -177,10 +179,15 @@ def audit(
     paid += tried.bought(
         "a table of the voltages of the visible cases", table_of_voltages(tried.visible_runs(solution))
     )
+    before, after = (each.format(**axis) for each in _SHAKING)
+    shaken = tried.shaken(
+        "the reference solution with white noise of 20 % of the limit",
+        text + _WRAPPED.format(before=before, after=after),
+    )
     if paid and not measured:
         paid = [f"{said}; no criterion measures a margin that could be required" for said in paid]
-        return faults, paid
-    return faults + paid, _tables(assignment.criteria)
+        return faults, paid + shaken
+    return faults + paid, shaken + _tables(assignment.criteria)
 
 
 def _axis(case: Any) -> dict[str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -102,7 +102,7 @@ def of_interpolators(tried: Tried, solution: Path, reference: Grade) -> list[str
     for name, body in _BUILT.items():
         built = f"{text}\n\n_exact = interpolate\n\n\ndef interpolate(segment, T, params):\n{body}"
         faults += tried.zeroed(f"the reference solution {name}", built, reference)
-    faults += tried.zeroed("the reference solution in a notebook", in_a_notebook(text), reference)
+    faults += tried.zeroed("the reference solution in a notebook", in_a_notebook(text, tried.names()), reference)
     known = {}
     for run in tried.visible_runs(solution):
         segment = run.fact("segment")
@@ -114,12 +114,15 @@ def of_interpolators(tried: Tried, solution: Path, reference: Grade) -> list[str
     return faults + tried.timed("one row of a full circle, and back", text + _NO_CIRCLE, circles)
 
 
-def in_a_notebook(text: str) -> str:
-    """A file's text handed in as a notebook: each paragraph is a cell, with an experiment behind them."""
+def in_a_notebook(text: str, names: Sequence[str]) -> str:
+    """A file's text handed in as a notebook: each paragraph is a cell, with an experiment behind them.
+
+    `names` are those that are kept of it.
+    """
     paragraphs = [*text.split("\n\n\n"), "import rds\nresult = rds.Experiment().run()"]
     cells = [{"cell_type": "code", "metadata": {}, "outputs": [], "source": each} for each in paragraphs]
     whole = {"cells": cells, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}
-    return converted(json.dumps(whole).encode()).code.decode()
+    return converted(json.dumps(whole).encode(), names).code.decode()
 
 
 def _packed(values: np.ndarray) -> str:

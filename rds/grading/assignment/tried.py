@@ -14,6 +14,7 @@ from rds.grading.cases.case import LINEAR, CaseRun
 from rds.grading.cases.segment import SegmentCase
 from rds.grading.criteria.criterion import Criterion
 from rds.grading.grade import Band, Grade
+from rds.grading.intake.single import wanted
 
 DECIDES = 20  # samples after which a cheat knows the case by its reference
 _MOST = 1 / 3  # of all points: what students see may be known by heart, and must not pay more
@@ -43,11 +44,11 @@ class Tried:
     def gated(self, name: str, text: str) -> list[str]:
         """Gates that a design does not pass."""
         gates = {name for each in self._criteria for name in each.requires}
-        linear = {each.name for each in self._criteria if LINEAR in each.needs}
+        sound = {each.name for each in self._criteria if LINEAR in each.needs or each.kind == "noise-voltage"}
         return [
             f"{score.title}: an honest design earns nothing ({name}), and so nothing that requires it: {score.sentence}"
             for score in self._graded(name, text).grade.criteria
-            if score.name in gates & linear and score.band is Band.NONE
+            if score.name in gates & sound and score.band is Band.NONE
         ]
 
     def paid(self, name: str, text: str, cases: set[str]) -> list[str]:
@@ -58,6 +59,22 @@ class Tried:
             "a margin that is measured in its own cases, or a criterion that such a loop does not pass"
             for each in self._criteria
             if each.cases and set(each.cases) <= cases and LINEAR not in each.needs and scores[each.name].score
+        ]
+
+    def shaken(self, name: str, text: str) -> list[str]:
+        """Whether a law that shakes the motor is paid for what it does beside."""
+        graded = self._graded(name, text).grade
+        scores = {score.name: score for score in graded.criteria}
+        paid = [
+            each.title
+            for each in self._criteria
+            if each.cases and LINEAR not in each.needs and each.kind != "noise-voltage" and scores[each.name].score
+        ]
+        if not paid:
+            return []
+        return [
+            f"{name} earns {graded.score:.4g} of {self._assignment.max_score:.4g} points; let these require a "
+            f"criterion of the kind noise-voltage, which such a law does not pass: {', '.join(paid)}"
         ]
 
     def timed(self, name: str, text: str, cases: set[str]) -> list[str]:
@@ -72,6 +89,10 @@ class Tried:
             for each in timed
             if scores[each.name].score
         ]
+
+    def names(self) -> tuple[str, ...]:
+        """What is kept of a notebook."""
+        return wanted(self._assignment)
 
     def segments(self) -> Iterator[tuple[str, Segment]]:
         """The segment of each case, by the case's name."""

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from hashlib import sha256
 
 from rds.grading.intake.archives import files_in_own
+from rds.grading.intake.attempts import of_newest
 from rds.grading.intake.items import Item, Refusal, refusal
 from rds.grading.intake.layouts import StudentFiles
 from rds.grading.intake.names import shown, without_number
@@ -25,7 +26,7 @@ def chosen(handed: StudentFiles, accepted: Sequence[str]) -> Item:
 
     Nothing if there is none; Refusal if what there is may not be opened, or it cannot be told which one is meant.
     """
-    files = _with_unpacked(handed.items)
+    files = _with_unpacked(of_newest(handed.items, handed.notes))
     if not files:
         raise NothingToGrade("nothing was handed in")
     candidates = [item for item in files if item.is_code]

@@ -30,7 +30,7 @@ class Item:
     `parts` are the names of its folders and its own, below the place that was searched. `read(most)` gives its bytes,
     Refusal if there are more than `most`, or none can be had. `fault` says why it is not to be read at all. `time` is
     what the place says of when it came there, without a time zone where none is known. `is_unreadable`: whether the
-    `fault` is that of who grades, and not the author's.
+    `fault` is that of who grades, and not the author's. `attempt` tells the attempts of one student apart.
     """
 
     parts: tuple[str, ...]
@@ -38,6 +38,7 @@ class Item:
     time: datetime | None = None
     fault: str = ""
     is_unreadable: bool = False
+    attempt: str = ""
 
     @property
     def name(self) -> str:
@@ -53,6 +54,11 @@ class Item:
     def is_archive(self) -> bool:
         """Whether its name says that it is a zip."""
         return self.name.lower().endswith(ARCHIVE)
+
+    @property
+    def is_handed_in(self) -> bool:
+        """Whether it may be a submission, or a part of one: not a table or a note beside them."""
+        return self.is_code or self.is_archive or bool(self.fault)
 
 
 def is_clutter(parts: tuple[str, ...]) -> bool:

@@ -4,6 +4,7 @@ submitted/ada/ps1/controller.py                          nbgrader
 Ada Lovelace_12345_assignsubmission_file_/controller.py  Moodle, also without the folder
 lovelaceada_LATE_12345_67890_controller-1.py             Canvas
 Task 1_ada_attempt_2026-01-09-10-00-00_controller.py     Blackboard
+111-67890 - Ada Lovelace - Jan 5, 2026 1012 AM/x.py      Brightspace, also without the folder
 submission_12345/controller.py, submission_metadata.yml  Gradescope
 ada/controller.py, ada.py                                a folder, or a file, of each student
 """
@@ -17,12 +18,18 @@ from datetime import datetime
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.grading.intake.attempts import is_version
 from rds.grading.intake.gradescope import METADATA, Submitter, read_metadata
 from rds.grading.intake.items import Item
 from rds.grading.intake.names import shown, without_number
 
 TIMES = "timestamps.csv"  # of the instructor, at the top
 STAMP = "timestamp.txt"  # of nbgrader, beside a submission
+NOT_UNDERSTOOD = "the time at which it was handed in cannot be understood"  # begins a note
+# folders in which one student keeps parts of a submission
+_PARTS = frozenset(
+    {"code", "data", "doc", "docs", "lib", "notebooks", "old", "python", "source", "src", "test", "tests"}
+)
 _METADATA_LARGEST = 64 << 20  # bytes; Gradescope's holds all earlier results
 
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL)
@@ -33,6 +40,12 @@ _MOODLE_NUMBERS = re.compile(r"_(\d+)(?=_assignsubmission_(?:file|onlinetext)_)"
 _BLACKBOARD = re.compile(
     r"(?P<before>.+?_(?P<user>[^_]+))_attempt_(?P<time>\d{4}(?:-\d\d){5})(?:_(?P<file>.+)|\.txt)", re.DOTALL
 )
+# the first number is the user's, the second the assignment's; the hour and minute are written in one
+_BRIGHTSPACE = re.compile(
+    r"(?P<user>\d+)-\d+ - (?P<name>.+?) - (?P<time>(?:(?! - ).)*\d{3,4}(?: ?[AaPp]\.?[Mm]\.?)?)(?: - (?P<file>.+))?",
+    re.DOTALL,
+)
+_BRIGHTSPACE_TIMES = ("%b %d, %Y", "%B %d, %Y", "%d %b, %Y", "%d %B, %Y", "%d %b %Y", "%d %B %Y", "%Y-%m-%d")
 _CANVAS = re.compile(r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<id>\d+)_(?P<number>\d+)_(?P<file>.+)", re.DOTALL)
 
 
@@ -70,6 +83,7 @@ def sorted_out(
     `zipped`: whether they are in an export, whose times are the learning platform's. `accepted`: the names that a
     submission should have. InputError if there are several assignments and none has such a name.
     """
+    outermost = list(folders)
     items, folders = _without_root(items, folders, zipped, accepted)
     times = next((item for item in items if item.parts == (TIMES,)), None)
     items = [item for item in items if item is not times]
@@ -89,6 +103,9 @@ def sorted_out(
         for name in folders:
             sorting.files_of_moodle(name)
         return sorting.layout("moodle", times)
+    if _mostly(items, lambda item: _BRIGHTSPACE.fullmatch(item.parts[0])):
+        sorting.brightspace(items, folders)
+        return sorting.layout("brightspace", times)
     if _mostly(items, lambda item: len(item.parts) == 1 and _CANVAS.fullmatch(item.name)):
         for item in items:
             sorting.canvas(item)
@@ -109,6 +126,7 @@ def sorted_out(
         sorting.plain(item)
     for student in folders:
         sorting.files_of(student)
+    sorting.doubt(folders, is_cut=zipped and len(folders) == 2 and folders != outermost)
     return sorting.layout("folders and files", times)
 
 
@@ -147,6 +165,13 @@ class _Sorting:
             self._files[handed.student] = shown(item.name)
         else:
             self._ignored.append(shown(item.name))
+
+    def doubt(self, folders: Sequence[str], is_cut: bool) -> None:
+        """Tell with whom a folder may be no student, but a part of one's submission."""
+        for folder in folders:
+            if is_cut or _is_part(folder):
+                said = "is taken for a student; if the folder is a part of a student's submission, put all of that into"
+                self.files_of(folder).notes.append(f"{shown(folder)} {said} one folder with the student's name")
 
     def _noted(self, item: Item, said: str) -> None:
         """Tell it with the student that a file is called like, if there is one."""
@@ -223,7 +248,42 @@ class _Sorting:
                     when = datetime.strptime(match["time"], "%Y-%m-%d-%H-%M-%S")
                 except ValueError:
                     when = None
-                handed.items.append(replace(item, parts=(match["time"], match["file"]), time=when))
+                handed.items.append(replace(item, parts=(match["file"],), time=when, attempt=match["time"]))
+
+    def brightspace(self, items: Sequence[Item], folders: Sequence[str]) -> None:
+        """A folder, or a file, for each attempt; who has one name and two numbers is told so."""
+        numbers: dict[str, set[str]] = {}
+        for name in [*folders, *(item.name for item in items if len(item.parts) == 1)]:
+            if found := _BRIGHTSPACE.fullmatch(name):
+                numbers.setdefault(found["name"], set()).add(found["user"])
+
+        def of(found: re.Match[str]) -> StudentFiles:
+            name, number = found["name"], found["user"]
+            handed = self.files_of(f"{name}_{number}", platform="brightspace", name=shown(name), user=number)
+            handed.has_times = True
+            others = ", ".join(sorted(numbers.get(name, set()) - {number}))
+            said = f"somebody with another number ({others}) has the same name"
+            if others and said not in handed.notes:
+                handed.notes.append(said)
+            return handed
+
+        for item in items:
+            found = _BRIGHTSPACE.fullmatch(item.parts[0])
+            if found is None or not (found["file"] or len(item.parts) > 1):
+                self.plain(item)
+                continue
+            parts = (found["file"],) if len(item.parts) == 1 else item.parts[1:]
+            when, handed = _brightspace_time(found["time"]), of(found)
+            said = f"{NOT_UNDERSTOOD} ({shown(found['time'])!r}), and so is taken for nothing"
+            if when is None and said not in handed.notes:
+                handed.notes.append(said)
+            handed.items.append(replace(item, parts=parts, time=when, attempt=found["time"]))
+        for folder in folders:
+            found = _BRIGHTSPACE.fullmatch(folder)
+            if found:
+                of(found)
+            else:
+                self.files_of(folder)
 
     def files_of_gradescope(self, folder: str, submitters: dict[str, Submitter]) -> StudentFiles:
         who = submitters.get(folder)
@@ -239,16 +299,30 @@ class _Sorting:
         handed = self.files_of_gradescope(item.parts[0], submitters)
         handed.has_times |= who is not None
         when = None if who is None else who.time
-        handed.items.append(replace(item, parts=item.parts[1:], time=when))
+        handed.items.append(replace(item, parts=item.parts[1:], time=when, attempt=item.parts[0]))
+
+
+def _brightspace_time(said: str) -> datetime | None:
+    """As in "Jan 5, 2026 1012 AM" or "5 January, 2026 942 PM"; None for what is written otherwise."""
+    day, _, rest = re.sub(r" ?([AaPp])\.?[Mm]\.?$", r"_\1M", said).rpartition(" ")
+    clock, _, half = rest.partition("_")
+    for form in _BRIGHTSPACE_TIMES:
+        try:
+            return datetime.strptime(f"{day} {clock:0>4}{half}", f"{form} {'%I%M%p' if half else '%H%M'}")
+        except ValueError:
+            pass
+    return None
 
 
 def _without_root(
     items: Sequence[Item], folders: Sequence[str], zipped: bool, accepted: Sequence[str]
 ) -> tuple[list[Item], list[str]]:
     """Without the one folder around everything that exports and courses have, or who packs a folder into a zip."""
-    while len(folders) == 1 and all(len(item.parts) > 1 for item in items if _is_handed_in(item)):
-        known = re.fullmatch(r"assignment_\d+_export|submitted|submissions", folders[0])
-        is_one_s = bool(_MOODLE_FOLDER.fullmatch(folders[0])) or any(item.parts == (METADATA,) for item in items)
+    while len(folders) == 1 and all(len(item.parts) > 1 for item in items if item.is_handed_in):
+        known = re.fullmatch(r"assignment_\d+_export|submitted|submissions|Student Work|Submitted files", folders[0])
+        is_one_s = any(each.fullmatch(folders[0]) for each in (_MOODLE_FOLDER, _BRIGHTSPACE)) or any(
+            item.parts == (METADATA,) for item in items
+        )
         if not known and (is_one_s or not zipped or not _is_of_a_class(items, accepted)):
             break
         items = [replace(item, parts=item.parts[1:]) if len(item.parts) > 1 else item for item in items]
@@ -258,7 +332,7 @@ def _without_root(
 
 def _is_of_a_class(items: Sequence[Item], accepted: Sequence[str]) -> bool:
     """Whether what lies in one folder is several students': in a folder, or a file, of each of them."""
-    handed_in = [item for item in items if _is_handed_in(item)]
+    handed_in = [item for item in items if item.is_handed_in]
     if len(handed_in) < 2:
         return False
     at = 1  # of the first folder, or file, that they do not share
@@ -267,12 +341,13 @@ def _is_of_a_class(items: Sequence[Item], accepted: Sequence[str]) -> bool:
     alone = [item.name for item in handed_in if len(item.parts) == at]
     in_folders = {item.parts[at - 1] for item in handed_in if len(item.parts) > at}
     is_one_s = any(without_number(name)[0] in accepted for name in alone)
+    is_one_s |= bool(in_folders) and not alone and all(map(_is_part, in_folders))
     return not is_one_s and (len(in_folders) > 1 or len(alone) > 1)
 
 
-def _is_handed_in(item: Item) -> bool:
-    """Whether it may be a submission, or a part of one: not a table or a note beside them."""
-    return item.is_code or item.is_archive or bool(item.fault)
+def _is_part(folder: str) -> bool:
+    """Whether a folder is called as one inside a submission is."""
+    return is_version(folder) or folder.lower() in _PARTS
 
 
 def _mostly(items: Sequence[Item], fits: Any) -> bool:

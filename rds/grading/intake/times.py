@@ -8,10 +8,9 @@ from zoneinfo import ZoneInfo
 
 from rds.core.errors import InputError
 from rds.grading.intake.items import Refusal
-from rds.grading.intake.layouts import STAMP, TIMES, Layout, StudentFiles
+from rds.grading.intake.layouts import NOT_UNDERSTOOD, STAMP, TIMES, Layout, StudentFiles
 from rds.grading.table_text import rows_by_heading
 
-NOT_UNDERSTOOD = f"its {STAMP} cannot be understood"  # begins a note
 _LARGEST = 4 << 20  # bytes
 # Hours of those that mean one zone only (CST, IST and BST are several) and are no names of the time zone database.
 _ABBREVIATIONS = {"AKDT": -8, "AKST": -9, "PDT": -7, "PST": -8, "MDT": -6, "CDT": -5, "EDT": -4}
@@ -61,7 +60,7 @@ def stamped_time(handed: StudentFiles) -> datetime | None:
         when = _nbgrader_time(text)
         return when if when.tzinfo else when.replace(tzinfo=UTC)
     except (Refusal, UnicodeDecodeError, ValueError, KeyError, OSError):
-        handed.notes.append(f"{NOT_UNDERSTOOD} ({text[:60]!r}), and so is taken for nothing")
+        handed.notes.append(f"{NOT_UNDERSTOOD} ({text[:60]!r} in its {STAMP}), and so is taken for nothing")
         return None
 
 

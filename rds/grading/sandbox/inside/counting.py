@@ -195,9 +195,19 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
         settrace(None)
         setprofile(None)
 
+    def quiet(set_it: Callable[..., None]) -> Any:
+        """In place of `sys.settrace`: to take away what is not seen, as doctest does, takes nothing away."""
+
+        def take(function: Any, /) -> None:
+            if function is not None:
+                set_it(function)  # refused by the guard
+
+        return _hidden(take)
+
     tracing, calling = _hidden(line), _hidden(call)
     found = Counted(*[_hidden(each) for each in (begin, receive, send, total, stop)])
     sys.gettrace = sys.getprofile = lambda: None  # it looks like a run that is not counted
+    sys.settrace, sys.setprofile = quiet(settrace), quiet(setprofile)
     sys._getframe, _imp.create_builtin, _signal.signal = _hidden(look), _hidden(create_new), _hidden(handle)
     sys.addaudithook(guard)
     is_open = True
