@@ -77,3 +77,12 @@ def test_times_of_day_go_on_through_midnight(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("\n".join(["time,voltage [V],position [mm]", *rows]) + "\n")
     (log,) = read_log(tmp_path / "log.csv")
     assert np.allclose(log.time, made["time"], atol=1e-9, rtol=0.0)
+
+
+def test_a_clock_that_is_set_back_an_hour_is_told(tmp_path: Path) -> None:
+    rows = [f"2024-10-27 02:59:59.{k:03d},{k % 7},{k}" for k in range(900, 1000)]
+    rows += [f"2024-10-27 02:00:00.{k:03d},{k % 7},{1000 + k}" for k in range(100)]
+    path = tmp_path / "log.csv"
+    path.write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match=r"set back by an hour .* summer time ends: log UTC"):
+        read_log(path)

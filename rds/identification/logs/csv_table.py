@@ -28,7 +28,8 @@ _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 _DAY = 86400.0  # s
 _WIDE, _TIMES_WIDER = 100, 10  # columns from which, and rows of which, a table lies on its side
 _END = b"EOF"  # the last line of an export of TwinCAT's scope
-_NULLS = [" ", *BLANKS, *(word.upper() for word in BLANKS), "NaN", "Null", "None", "Inf", "+Inf", "-Inf"]
+_SPELLED = (str.lower, str.upper, str.capitalize)
+_NULLS = [" ", "NaN", "+Inf", "-Inf", *(spelled(word) for word in BLANKS for spelled in _SPELLED)]
 
 
 def read_csv(
@@ -82,6 +83,11 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
             break
         except _NotNumber as error:
             words.add(error.column)
+    found_late = {row for i, (row, _) in texts.items() if i not in layout.words}
+    if not values and len(found_late) == 1:
+        cells = ", ".join(repr(texts[i][1]) for i in sorted(texts) if i not in layout.words)
+        what = f"data row {found_late.pop() + 1} holds words in every column ({cells:.80}): another table begins there"
+        raise InputError(f"{what}; put each recording into a file of its own, or remove the line", str(path))
     if remarks:
         findings.append(Finding("comments", f"{remarks} remarks between the rows were passed over"))
     rows = max(map(len, values.values()), default=0)
@@ -90,6 +96,9 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
     if layout.passed:
         what = f"a line above the first row of data has numbers, too, and was passed over: {layout.passed[:80]!r}"
         findings.append(Finding("headings", what, Gravity.WARNING))
+    if layout.torn:
+        what = f"the heading says {'; '.join(layout.torn[:8])}: the heading was followed; "
+        findings.append(Finding("units", what + "give the unit in a map if the row below is right", Gravity.WARNING))
     if layout.scaled:
         what = f"{', '.join(layout.scaled[:8])}: a factor or an offset stands in the head of the file, which does not "
         what += "tell whether it is applied; compare the values with what was displayed, and give scale in a map if not"

@@ -238,6 +238,13 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     kind = next((report for of, report in kinds.items() if of in units), None)
     if kind is not None and (numbered or in_time):
         sentence += f"; such readings are for `rds report {kind}`"
+    rising = [
+        c.name for c in columns if c.unit is None and _rises(c.values) and (_role(c.name) is None or _is_even(c.values))
+    ]
+    rising = [name for name in rising if name.lower() not in _ORDINALS]
+    if kind is None and rising:
+        called = ", ".join(map(repr, rising[:3])) + (" ..." if len(rising) > 3 else "")
+        sentence += f"; where the time is {called}, say so in a map, with its unit: column and unit under [time]"
     return sentence + "; if its rows are equally spaced in time, say so in a map: rate = 1000.0 (Hz) under [time]"
 
 
@@ -248,6 +255,12 @@ def _are_alike(a: Column, b: Column) -> bool:
 def _rises(values: np.ndarray) -> bool:
     steps = np.diff(values[:100_000])
     return len(steps) > 0 and bool(np.mean(steps > 0.0) >= _RISING)
+
+
+def _is_even(values: np.ndarray) -> bool:
+    """Whether all steps are alike, as of the time in the first row of a matrix that Simulink has saved."""
+    steps = np.diff(values[:100_000])
+    return len(steps) > 0 and bool(np.all(np.abs(steps - np.median(steps)) < 1e-3 * abs(np.median(steps))))
 
 
 def _tokens(name: str) -> list[str]:
