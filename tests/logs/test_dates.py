@@ -86,3 +86,19 @@ def test_a_clock_that_is_set_back_an_hour_is_told(tmp_path: Path) -> None:
     path.write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
     with pytest.raises(InputError, match=r"set back by an hour .* summer time ends: log UTC"):
         read_log(path)
+
+
+@pytest.mark.parametrize(("unit", "refused"), [("ns", False), ("us", True), ("ms", True)])
+def test_a_date_of_another_age_is_told(tmp_path: Path, unit: str, refused: bool) -> None:
+    """ROS counts ns since 1970; taken for µs the log would be 1000 times as long."""
+    path = tmp_path / "log.csv"
+    rows = (f"{1700000000000000000 + 1000000 * k},{k % 7},{k}" for k in range(300))
+    path.write_text("%time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    (tmp_path / "log.csv.map.toml").write_text(
+        f'[time]\ncolumn = "time"\nunit = "{unit}"\n[axis.X]\ncommand = "voltage"\nposition = "position"\n'
+    )
+    if refused:
+        with pytest.raises(InputError, match=r"time .* begins after \d+ years, counted in"):
+            read_log(path)
+    else:
+        assert read_log(path)[0].sample_period == pytest.approx(1e-3, rel=1e-3)

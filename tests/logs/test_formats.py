@@ -324,3 +324,10 @@ def test_lines_of_json_are_refused_with_what_turns_them_into_a_table(tmp_path: P
     path.write_text('{"t": 0.0, "u": 1.0}\n')
     with pytest.raises(InputError, match="lines=True"):
         read_table(path)
+
+
+def test_lines_of_json_in_a_text_file_are_told_too(tmp_path: Path) -> None:
+    path = tmp_path / "VESC_LOG.TXT"
+    path.write_text('{"rpm":0,"t":1.776034,"dutyCycleNow":0.002}\n' * 20)
+    with pytest.raises(InputError, match="its lines are JSON"):
+        read_table(path)

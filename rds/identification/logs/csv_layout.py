@@ -86,6 +86,8 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         remedy = "it needs columns of numbers, separated by commas, semicolons, tabs, bars or spaces"
         if quoted and decimal is None:
             remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
+        if shown.lstrip().startswith("{"):
+            remedy = "its lines are JSON: in Python `pandas.read_json(FILE, lines=True).to_csv('log.csv', index=False)`"
         if any(_are_numbers(line.split(":")) for line in lines):
             remedy += "; its cells seem to stand between colons: export it with semicolons between them"
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
