@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -102,3 +103,26 @@ def test_a_date_of_another_age_is_told(tmp_path: Path, unit: str, refused: bool)
             read_log(path)
     else:
         assert read_log(path)[0].sample_period == pytest.approx(1e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "form", ["%d.%m.%Y %H:%M:%S,%f", "%Y-%m-%d %H:%M:%S,%f", "%H:%M:%S,%f", "%d.%m.%Y %H:%M:%S.%f"]
+)
+def test_dates_of_german_recorders_and_of_logging_are_times(tmp_path: Path, form: str) -> None:
+    """`05.04.2024` is never the fourth of May, as a day between points comes first."""
+    begin = datetime(2024, 4, 5, 11, 59, 59, 900000)
+    stamps = [(begin + timedelta(milliseconds=k)).strftime(form) for k in range(300)]
+    path = tmp_path / "log.csv"
+    rows = (f"{stamp};{k % 7},5;{k},25" for k, stamp in enumerate(stamps))
+    path.write_text("Zeit;Spannung [V];Position [mm]\n" + "\n".join(rows) + "\n")
+    (log,) = read_log(path)
+    assert np.allclose(log.time, 1e-3 * np.arange(300), atol=1e-9) and log.position[1] == 1.25
+
+
+def test_a_time_of_day_before_a_comma_keeps_its_neighbour(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = (f"12:00:{k // 10:02d}.{k % 10}00,{k % 7},{k}" for k in range(300))
+    path.write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    assert read_log(path)[0].command[3] == 3.0
+    path.write_text("time,voltage [V],position [mm]\n" + "".join(f"12:00:{k:02d},{k % 7},{k}\n" for k in range(60)))
+    assert read_log(path)[0].command[3] == 3.0 and read_log(path)[0].sample_period == pytest.approx(1.0)

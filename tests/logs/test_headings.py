@@ -263,3 +263,32 @@ def test_the_time_in_the_first_row_of_a_matrix_of_simulink_is_offered(tmp_path: 
     savemat(tmp_path / "log.mat", {"yaw_speed": np.array([0.001 * T, U])})
     with pytest.raises(InputError, match="where the time is 'yaw_speed_1', say so in a map"):
         read_log(tmp_path / "log.mat")
+
+
+@pytest.mark.parametrize(
+    ("head", "quantity"),
+    [
+        ("time [s],Voltage [V],Command Position [mm]", "position"),
+        ("time [s],Voltage [V],Position Difference [mm]", "position"),
+        ("time [s],Bus Voltage [V],Position [mm]", "command"),
+        ("time [s],Supply Voltage [V],Speed [rpm]", "command"),
+    ],
+)
+def test_what_was_not_measured_or_drives_nothing_is_not_guessed(tmp_path: Path, head: str, quantity: str) -> None:
+    with pytest.raises(InputError, match=f"no column tells by its unit that it is the {quantity}"):
+        read_log(written(tmp_path, "log.csv", head + "\n", [0.001 * T, U, X], ","))
+
+
+def test_a_command_position_beside_the_measured_one_is_the_reference(tmp_path: Path) -> None:
+    head = "time [s],Voltage [V],Command Position [mm],Position [mm],Bus Voltage [V]\n"
+    (log,) = read_log(written(tmp_path, "log.csv", head, [0.001 * T, U, X + 1.0, X, 0.0 * X + 24.0], ","))
+    assert np.allclose(log.position, X, atol=1e-5) and np.allclose(log.command, U, atol=1e-5)
+    assert np.allclose(log.extra["reference"], X + 1.0, atol=1e-5)
+
+
+def test_signals_that_follow_each_other_in_rows_are_told_how_to_turn(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = (f"{name},{0.001 * k:.3f},{k}" for k in range(200) for name in ("position", "voltage"))
+    path.write_text("name,time [s],value\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match=r"pivot\(index='time', columns='name', values='value'\)"):
+        read_log(path)

@@ -34,8 +34,8 @@ BLANKS = frozenset(
 )
 _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
-_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
-_CLOCK = re.compile(r"\d\d:\d\d:\d\d(\.\d{1,9})?")  # a time of day
+_DATE = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+_CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
 _RIGOL = re.compile(
     r"X,(CH\d,)+Start,Increment,?\s*"
 )  # an oscilloscope's first line; the second has units, start, step

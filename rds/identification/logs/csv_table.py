@@ -24,6 +24,8 @@ Progress = Callable[[int, int], None]
 _BLOCK = 1 << 22  # bytes
 _TAIL = 1 << 14  # bytes at the end in which a cut is looked for
 _REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")
+_DOTTED_DATE = re.compile(rb"(?<![\d.])(\d\d)\.(\d\d)\.(\d{4})[T ](?=\d\d:\d\d)")  # the day is first, always
+_COMMA_TIME = re.compile(rb"(?<!\d)(\d\d:\d\d:\d\d),(\d)")
 _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 _DAY = 86400.0  # s
 _WIDE, _TIMES_WIDER = 100, 10  # columns from which, and rows of which, a table lies on its side
@@ -237,6 +239,7 @@ class _Rows:
         self._delimiter, self._width = layout.delimiter.encode(), len(layout.names) if layout.ragged else 0
         for _ in range(layout.first):
             self._file.readline()  # within what the layout was found in
+        self._stamped = bool(layout.dates)
         self.remarks, self.closed = 0, False
 
     @property
@@ -254,6 +257,9 @@ class _Rows:
             data += self._rest_of_line()
             data, remarks = _REMARK.subn(b"", data)
             self.remarks += remarks
+            if self._stamped:  # as Germans and Python's logging write them
+                data = _DOTTED_DATE.sub(rb"\3-\2-\1 ", data)
+                data = data if self._delimiter == b"," else _COMMA_TIME.sub(rb"\1.\2", data)
             if self._spaces:
                 data = re.sub(rb"[ \t]+", b" ", _SPACES.sub(b"", data))
             if self._width:
