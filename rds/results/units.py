@@ -19,6 +19,8 @@ _ENDINGS = {
 }
 _HEADING = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 
+_INDEX = re.compile(r"\d+(\.\d+)?")
+
 
 def default_unit(name: str) -> str:
     """The unit that a column called `name` has when nothing else is said; "" for an unknown name."""
@@ -35,4 +37,6 @@ def heading(name: str, unit: str) -> str:
 def split_heading(text: str) -> tuple[str, str | None]:
     """Name and unit of a heading such as `time [s]` or `time (s)`; None where it gives no unit."""
     match = _HEADING.fullmatch(text.strip())
+    if match and _INDEX.fullmatch(match["unit"]) and (match["unit"] != "1" or text.strip()[len(match["name"])] != " "):
+        match = None  # `output[0]` and `FPOS(1)` are names with a number, and `duty [1]` has a unit
     return (match["name"], match["unit"].strip()) if match else (text.strip(), None)

@@ -171,3 +171,18 @@ def test_a_can_fd_frame_that_is_cut_is_named(tmp_path: Path) -> None:
     (tmp_path / "a.log").write_text(" (1.5)  can0  123  [12]  01 02 03\n")
     with pytest.raises(InputError, match="3 bytes of data, and its length says 12"):
         list(LogFile(tmp_path / "a.log"))
+
+
+@pytest.mark.parametrize("kind", ["absolute", "relative"])
+def test_distances_between_the_frames_of_an_asc_are_not_taken_for_times(tmp_path: Path, kind: str) -> None:
+    """Read as times, all frames of a log would stand within one sample."""
+    path = tmp_path / "log.asc"
+    rows = (f"   {(0.002 * k if kind == 'absolute' else 0.002):.6f} 1  181  Rx   d 2 01 0{k}" for k in range(1, 6))
+    head = f"date Fri Mar 1 11:59:58.000 am 2024\nbase hex  timestamps {kind}\ninternal events logged\n"
+    path.write_text(head + "\n".join(rows) + "\n")
+    if kind == "absolute":
+        times = [message.timestamp for message in LogFile(path)]
+        assert times[-1] - times[0] == pytest.approx(0.008, abs=1e-6)
+    else:
+        with pytest.raises(InputError, match="distances to the line before"):
+            list(LogFile(path))

@@ -75,3 +75,58 @@ def test_a_heading_that_would_command_the_terminal_is_refused(tmp_path: Path) ->
 def test_what_to_do_about_a_cell(cell: str, words: str) -> None:
     """A file of which a thousands separator were read as a decimal comma would be wrong by a factor of 1000."""
     assert words in remedy(cell)
+
+
+@pytest.mark.parametrize(
+    ("cell", "words"),
+    [
+        ("11:59:58.000 AM", "write times of day as 13:00:00.001"),
+        ("11:59:58,000", "a point before the fraction"),
+        ("0 days 00:00:01.5", "spans as s"),
+        ("1.002,5", "export the file without a sign that parts the thousands"),
+        ("1 002,5", "export the file without a sign that parts the thousands"),
+        ("1'002.5", "export the file without a sign that parts the thousands"),
+    ],
+)
+def test_times_of_day_and_thousands_of_other_countries_are_told_apart_from_words(cell: str, words: str) -> None:
+    assert words in remedy(cell)
+
+
+@pytest.mark.parametrize("cell", ["∞", "OVER", "OL", "ERR", "Bad", "--", "-1.#IND", "#DIV/0!", "-nan"])
+def test_what_a_recorder_writes_beyond_its_range_is_a_blank_that_a_map_can_drop(tmp_path: Path, cell: str) -> None:
+    path = write(tmp_path / "log.csv", headed(axis(400)))
+    lines = path.read_text().splitlines()
+    lines[400] = f"{lines[400].rpartition(',')[0]},{cell}"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match="position has no number in 1 of 400 samples, first in sample 399"):
+        read_log(path)
+    (tmp_path / "log.csv.map.toml").write_text(
+        'blanks = "drop"\n[time]\ncolumn = "time"\n[axis.X]\ncommand = "voltage"\nposition = "position"\n'
+    )
+    assert len(read_log(path)[0]) == 399
+
+
+def test_decimal_commas_between_commas_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = (f"{t:.3f},{u:.1f},{x:.3f}".replace(".", "!") for t, u, x in zip(*axis(50).values(), strict=True))
+    path.write_text("time [s],u [V],x [mm]\n" + "\n".join(rows).replace("!", ",") + "\n")
+    with pytest.raises(InputError, match=r"3 names, and its rows have 6 cells: decimal commas .* semicolons between"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("mark", [".", " "])
+def test_thousands_between_semicolons_are_named_and_split_no_cell(tmp_path: Path, mark: str) -> None:
+    path = tmp_path / "log.csv"
+    rows = (f"{2 * k:,};3!0;{7 * k:,}!25".replace(",", mark).replace("!", ",") for k in range(1500))
+    path.write_text("time [ms];voltage [V];position [mm]\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match="without a sign that parts the thousands"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("row", [0, 100])
+def test_a_heading_among_the_rows_is_where_another_table_begins(tmp_path: Path, row: int) -> None:
+    path = write(tmp_path / "log.csv", headed(axis(200)))
+    head, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([head, *rows[: row + 1], head, *rows[row + 1 :]]) + "\n")
+    with pytest.raises(InputError, match=rf"data row {row + 2} holds words in every column .* file of its own"):
+        read_log(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -77,3 +78,51 @@ def test_times_of_day_go_on_through_midnight(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("\n".join(["time,voltage [V],position [mm]", *rows]) + "\n")
     (log,) = read_log(tmp_path / "log.csv")
     assert np.allclose(log.time, made["time"], atol=1e-9, rtol=0.0)
+
+
+def test_a_clock_that_is_set_back_an_hour_is_told(tmp_path: Path) -> None:
+    rows = [f"2024-10-27 02:59:59.{k:03d},{k % 7},{k}" for k in range(900, 1000)]
+    rows += [f"2024-10-27 02:00:00.{k:03d},{k % 7},{1000 + k}" for k in range(100)]
+    path = tmp_path / "log.csv"
+    path.write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match=r"set back by an hour .* summer time ends: log UTC"):
+        read_log(path)
+
+
+@pytest.mark.parametrize(("unit", "refused"), [("ns", False), ("us", True), ("ms", True)])
+def test_a_date_of_another_age_is_told(tmp_path: Path, unit: str, refused: bool) -> None:
+    """ROS counts ns since 1970; taken for µs the log would be 1000 times as long."""
+    path = tmp_path / "log.csv"
+    rows = (f"{1700000000000000000 + 1000000 * k},{k % 7},{k}" for k in range(300))
+    path.write_text("%time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    (tmp_path / "log.csv.map.toml").write_text(
+        f'[time]\ncolumn = "time"\nunit = "{unit}"\n[axis.X]\ncommand = "voltage"\nposition = "position"\n'
+    )
+    if refused:
+        with pytest.raises(InputError, match=r"time .* begins after \d+ years, counted in"):
+            read_log(path)
+    else:
+        assert read_log(path)[0].sample_period == pytest.approx(1e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "form", ["%d.%m.%Y %H:%M:%S,%f", "%Y-%m-%d %H:%M:%S,%f", "%H:%M:%S,%f", "%d.%m.%Y %H:%M:%S.%f"]
+)
+def test_dates_of_german_recorders_and_of_logging_are_times(tmp_path: Path, form: str) -> None:
+    """`05.04.2024` is never the fourth of May, as a day between points comes first."""
+    begin = datetime(2024, 4, 5, 11, 59, 59, 900000)
+    stamps = [(begin + timedelta(milliseconds=k)).strftime(form) for k in range(300)]
+    path = tmp_path / "log.csv"
+    rows = (f"{stamp};{k % 7},5;{k},25" for k, stamp in enumerate(stamps))
+    path.write_text("Zeit;Spannung [V];Position [mm]\n" + "\n".join(rows) + "\n")
+    (log,) = read_log(path)
+    assert np.allclose(log.time, 1e-3 * np.arange(300), atol=1e-9) and log.position[1] == 1.25
+
+
+def test_a_time_of_day_before_a_comma_keeps_its_neighbour(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = (f"12:00:{k // 10:02d}.{k % 10}00,{k % 7},{k}" for k in range(300))
+    path.write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    assert read_log(path)[0].command[3] == 3.0
+    path.write_text("time,voltage [V],position [mm]\n" + "".join(f"12:00:{k:02d},{k % 7},{k}\n" for k in range(60)))
+    assert read_log(path)[0].command[3] == 3.0 and read_log(path)[0].sample_period == pytest.approx(1.0)

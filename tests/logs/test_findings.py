@@ -302,3 +302,15 @@ def test_sampling_that_is_too_slow_is_told_with_the_period_that_would_do(tmp_pat
     finding = grave(slow)["sampling"]
     assert "within its sample period of 50 ms" in finding.what and "ms or less tells it" in finding.what
     assert "sampling" not in grave(read(tmp_path, rows))
+
+
+def test_ripples_of_a_filter_are_no_leaps_of_an_encoder(tmp_path: Path) -> None:
+    """A filtered position has no noise beside which a leap could stand out; a ripple of 1 % of a step is none."""
+    t = np.arange(3000) * 1e-3
+    position = 20.0 * (1.0 - np.cos(2.0 * t))
+    columns = {"time [s]": t, "voltage [V]": np.sin(2.0 * t), "position [mm]": position + 4e-4 * (t > 0.7005)}
+    (log,) = read_log(write(tmp_path / "ripple.csv", columns))
+    assert not [f for f in log.findings if f.kind == "leap"]
+    columns["position [mm]"] = position + 0.1 * (t > 0.7005)
+    (log,) = read_log(write(tmp_path / "slip.csv", columns))
+    assert ["at 0.701 s by +0." in f.what for f in log.findings if f.kind == "leap"] == [True]

@@ -317,3 +317,17 @@ def test_readings_that_are_no_time_series_are_sent_to_their_report(stem: str, re
         assert not found.usable and not found.draft
         (fault,) = [f.what for f in found.findings if f.gravity == "fault"]
         assert fault.startswith("it is no log over time: ") and f"`rds report {report}`" in fault
+
+
+def test_lines_of_json_are_refused_with_what_turns_them_into_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "log.jsonl"
+    path.write_text('{"t": 0.0, "u": 1.0}\n')
+    with pytest.raises(InputError, match="lines=True"):
+        read_table(path)
+
+
+def test_lines_of_json_in_a_text_file_are_told_too(tmp_path: Path) -> None:
+    path = tmp_path / "VESC_LOG.TXT"
+    path.write_text('{"rpm":0,"t":1.776034,"dutyCycleNow":0.002}\n' * 20)
+    with pytest.raises(InputError, match="its lines are JSON"):
+        read_table(path)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from rds.core.errors import InputError
 from rds.identification.logs.csv_headings import name_and_unit
@@ -217,3 +218,77 @@ def test_rows_that_are_taken_for_the_head_are_told(tmp_path: Path) -> None:
 def test_a_preamble_with_numbers_is_no_lost_row(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("Attenuation,10,10\nt [s],u [V],x [mm]\n" + "0.1,2,3\n0.2,3,4\n" * 3)
     assert not read_table(tmp_path / "a.csv").findings
+
+
+@pytest.mark.parametrize(
+    ("cell", "name", "unit"),
+    [
+        ("output[0]", "output[0]", None),
+        ("output[1]", "output[1]", None),
+        ("FPOS(2)", "FPOS(2)", None),
+        ("mzv (52.4)", "mzv (52.4)", None),
+        ("duty [1]", "duty", "1"),
+        ("u[V]", "u", "V"),
+        ("output[3] [V]", "output[3]", "V"),
+    ],
+)
+def test_a_number_in_brackets_is_an_index_and_no_unit(cell: str, name: str, unit: str | None) -> None:
+    assert name_and_unit(cell) == (name, unit)
+
+
+@pytest.mark.parametrize("label", ["Unit", "[units]", "Einheit:"])
+def test_a_row_of_units_may_begin_with_its_label(tmp_path: Path, label: str) -> None:
+    head = f"Name;time;voltage;position\n{label};ms;V;um\n"
+    table = read_table(written(tmp_path, "log.csv", head, [T, T, U, X], ";"))
+    assert [(c.name, c.unit) for c in table.columns.values()][1:] == [
+        ("time", "ms"),
+        ("voltage", "V"),
+        ("position", "um"),
+    ]
+
+
+def test_two_units_of_one_column_are_told(tmp_path: Path) -> None:
+    head = "Time (s),voltage (V),position (mm)\nms,V,mm\n"
+    (log,) = read_log(written(tmp_path, "log.csv", head, [T, U, X], ","))
+    assert any("the heading says Time in s, and ms below: the heading was followed" in f.what for f in log.findings)
+
+
+def test_a_time_of_another_name_is_offered(tmp_path: Path) -> None:
+    head = "ms_today;input_voltage;erpm\n"
+    with pytest.raises(InputError, match="where the time is 'ms_today', say so in a map, with its unit"):
+        read_log(written(tmp_path, "log.csv", head, [T, U, X], ";"))
+
+
+def test_the_time_in_the_first_row_of_a_matrix_of_simulink_is_offered(tmp_path: Path) -> None:
+    savemat(tmp_path / "log.mat", {"yaw_speed": np.array([0.001 * T, U])})
+    with pytest.raises(InputError, match="where the time is 'yaw_speed_1', say so in a map"):
+        read_log(tmp_path / "log.mat")
+
+
+@pytest.mark.parametrize(
+    ("head", "quantity"),
+    [
+        ("time [s],Voltage [V],Command Position [mm]", "position"),
+        ("time [s],Voltage [V],Position Difference [mm]", "position"),
+        ("time [s],Bus Voltage [V],Position [mm]", "command"),
+        ("time [s],Supply Voltage [V],Speed [rpm]", "command"),
+    ],
+)
+def test_what_was_not_measured_or_drives_nothing_is_not_guessed(tmp_path: Path, head: str, quantity: str) -> None:
+    with pytest.raises(InputError, match=f"no column tells by its unit that it is the {quantity}"):
+        read_log(written(tmp_path, "log.csv", head + "\n", [0.001 * T, U, X], ","))
+
+
+def test_a_command_position_beside_the_measured_one_is_the_reference(tmp_path: Path) -> None:
+    head = "time [s],Voltage [V],Command Position [mm],Position [mm],Bus Voltage [V]\n"
+    (log,) = read_log(written(tmp_path, "log.csv", head, [0.001 * T, U, X + 1.0, X, 0.0 * X + 24.0], ","))
+    assert np.allclose(log.position, X, atol=1e-5) and np.allclose(log.command, U, atol=1e-5)
+    assert np.allclose(log.extra["reference"], X + 1.0, atol=1e-5)
+
+
+def test_signals_that_follow_each_other_in_rows_are_told_how_to_turn(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = (f"{name},{0.001 * k:.3f},{k}" for k in range(200) for name in ("position", "voltage"))
+    path.write_text("name,time [s],value\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match=r"pivot\(index='time', columns='name', values='value'\)"):
+        read_log(path)

@@ -141,11 +141,16 @@ class LogFile:
     def _lines(self, ending: str) -> Iterator[can.Message]:
         with self._open() as file:
             lines = Lines(file, str(self.path), ending, self.path.stat().st_size if self._packed else 0)
-            found = False
+            found, before = False, -math.inf
             try:
-                for message in _READERS[ending](cast(TextIO, lines)):
+                reader = _READERS[ending](cast(TextIO, lines))
+                for message in reader:
                     lines.frames += 1
                     problem = _problem(message)
+                    if message.timestamp <= before and getattr(reader, "timestamps_format", "") == "relative":
+                        what = "its head says `timestamps relative`: distances to the line before, which are no times; "
+                        raise InputError(what + "save it with absolute ones", str(self.path))
+                    before = message.timestamp
                     if problem:
                         raise lines.fault(problem)
                     found = True

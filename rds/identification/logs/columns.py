@@ -13,6 +13,8 @@ from rds.identification.logs.table import Column, Table
 from rds.identification.logs.units import base, check_unit, dimension, factor, plain
 
 _AMBIGUOUS = 0.4  # of a counter's range, in a sample: it may have gone the other way round
+_YEAR = 3.156e7  # s
+_NO_DATE = 1e11  # s: MATLAB counts days since the year 0, others since 1601, 1904, or 1970
 _LATE = 1e7  # s: times beyond are dates, of which a float64 in s keeps 0.1 µs only: they are counted from the first
 
 
@@ -37,8 +39,12 @@ def column_time(table: Table, about: TimeMap) -> np.ndarray:
     second = factor(unit, "s")
     numbers = column.values if about.wrap is None else _unwrapped(column.values, about.wrap)[0]
     values = (about.scale * numbers + about.offset) * second
-    _check_size(values, f"time ({column.name!r}, in s)", about.place)
     finite = np.flatnonzero(np.isfinite(values))
+    if len(finite) and abs(values[finite[0]]) > _NO_DATE:
+        years = abs(values[finite[0]]) / _YEAR
+        what = f"time ({column.name!r}) begins after {years:.0f} years, counted in {unit}"
+        raise InputError(f"{what}: no calendar goes so far; the unit is a smaller one", about.place)
+    _check_size(values, f"time ({column.name!r}, in s)", about.place)
     if len(finite) and abs(values[finite[0]]) > _LATE:  # from the first row on, before digits are lost to its size
         values = about.scale * (numbers - numbers[finite[0]]) * second
     return values

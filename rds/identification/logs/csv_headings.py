@@ -30,6 +30,7 @@ _TIMES_ALONE = ("ms", "us", "µs", "μs")  # headings of a time by its unit; `s`
 class Headings(NamedTuple):
     """`times`: which columns hold the times of the columns after them; none where there is one time, or none.
 
+    `torn`: columns whose heading says another unit than the row of units.
     `scaled`: channels with a factor or an offset, of which the file does not tell whether its numbers have it.
     """
 
@@ -37,6 +38,7 @@ class Headings(NamedTuple):
     units: tuple[str | None, ...]
     times: tuple[int, ...] = ()
     scaled: tuple[str, ...] = ()
+    torn: tuple[str, ...] = ()
 
 
 def alternates(units: Sequence[str | None]) -> bool:

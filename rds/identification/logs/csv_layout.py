@@ -16,7 +16,7 @@ from pathlib import Path
 
 from rds.core.errors import InputError
 from rds.identification.logs.csv_headings import Headings, alternates, labelled_headings, labview_units, name_and_unit
-from rds.identification.logs.units import dimension
+from rds.identification.logs.units import dimension, plain
 from rds.results.units import split_heading
 
 _FEW = 20  # rows of data that are looked at for how they end
@@ -24,9 +24,18 @@ HEAD = 1 << 16  # bytes looked at
 _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
 COMMENTS = ("#", "%", "//", "!")
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
-BLANKS = frozenset(("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "+inf"))
-_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
-_CLOCK = re.compile(r"\d\d:\d\d:\d\d(\.\d{1,9})?")  # a time of day
+BLANKS = frozenset(
+    (
+        *("", "nan", "+nan", "-nan", "na", "n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf"),
+        *("∞", "-∞", "+∞", "over", "ol", "err", "error", "bad"),  # of meters and oscilloscopes, beyond their range
+        *("#n/a", "#div/0!", "#value!", "#num!", "#ref!"),  # of spreadsheets
+        *("-1.#ind", "1.#qnan", "1.#inf", "-1.#inf", "-nan(ind)", "nan(ind)"),  # of C on Windows
+    )
+)
+_OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
+_UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
+_DATE = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+_CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
 _RIGOL = re.compile(
     r"X,(CH\d,)+Start,Increment,?\s*"
 )  # an oscilloscope's first line; the second has units, start, step
@@ -51,6 +60,7 @@ class Layout:
     counted: tuple[float, float] | None = None  # the first column is a number of the sample: time of the first, step
     passed: str = ""  # a line above the data that has numbers in it, too
     scaled: tuple[str, ...] = ()  # channels of which nothing tells whether their numbers are scaled
+    torn: tuple[str, ...] = ()  # of columns for which the heading and the row of units say different units
     beside: int = 0  # columns at the left that hold the recorder's settings beside the samples
     surplus: tuple[str, ...] = ()  # headings below which no cells stand
 
@@ -76,6 +86,8 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         remedy = "it needs columns of numbers, separated by commas, semicolons, tabs, bars or spaces"
         if quoted and decimal is None:
             remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
+        if shown.lstrip().startswith("{"):
+            remedy = "its lines are JSON: in Python `pandas.read_json(FILE, lines=True).to_csv('log.csv', index=False)`"
         if any(_are_numbers(line.split(":")) for line in lines):
             remedy += "; its cells seem to stand between colons: export it with semicolons between them"
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
@@ -90,8 +102,10 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         first = _with_faulty_rows(lines, first, mark, point, width)
         lines, surplus = _cut_heading(lines, first, mark, point, width)
         found_heads = _headings(lines, first, mark, point, width)
-    names, units, times, scaled = found_heads
+    names, units, times, scaled, torn = found_heads
     width = len(names)
+    if mark == "," and not labelled and first > 0:
+        _refuse_decimal_commas(split(lines[first - 1], mark), width, path)
     if labelled:  # most rows may be shorter, as channels end one after another
         first = _below_labels(lines, first, mark, point, width)
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
@@ -129,8 +143,18 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         counted,
         passed,
         scaled,
+        torn,
         surplus=surplus,
     )
+
+
+def _refuse_decimal_commas(heading: Sequence[str], width: int, path: Path) -> None:
+    """InputError where each name of a heading, or all but one, has two cells of the rows, as of decimal commas."""
+    count = len(heading)
+    if (width == 2 * count > 2 or width == 2 * count - 1 > 3) and all(name and name[0].isalpha() for name in heading):
+        what = f"its heading has {count} names, and its rows have {width} cells: decimal commas seem to stand there "
+        what += "between commas, where nobody can tell them apart"
+        raise InputError(f"{what}; export it with decimal points, or with semicolons between the cells", str(path))
 
 
 def _worth_trying(lines: Sequence[str]) -> list[str]:
@@ -222,6 +246,8 @@ def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int,
                 is_number(cell, decimal) or bool(_DATE.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in cells
             ]
             blanks = sum(cell.lower() in BLANKS for cell in cells)
+            if delimiter in ", " and _OTHER_MARK.search(line):
+                continue
             if any(kinds) and sum(kinds) + blanks >= len(cells) / 2:
                 fits = [kind or cell.lower() in BLANKS for kind, cell in zip(kinds, cells, strict=True)]
                 rows.setdefault(len(cells), []).append((number, fits))
@@ -345,21 +371,26 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
         rows = [found or _heading_cells(line, delimiter, width) for found, line in zip(rows, above, strict=True)]
     units: list[str | None] = [None] * width
     heads = rows[-1] if rows else None
+    if heads is not None and heads[0].strip("[]():").casefold() in _UNIT_LABELS and _are_units(heads[1:]):
+        heads = ["", *heads[1:]]  # a label, and no unit
     above_units = heads is not None and _are_units(heads) and len(rows) > 1 and rows[-2] is not None
     if heads is not None and above_units:
         units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
         heads = rows[-2]
     if heads is None or (any(is_number(cell, decimal) for cell in heads) and not above_units):
         return Headings(tuple(f"column {i + 1}" for i in range(width)), tuple(units))
-    names = []
+    names: list[str] = []
+    torn: list[str] = []
     for i, cell in enumerate(heads):
         name, unit = name_and_unit(cell.strip('"'))
         if units[i] is not None and unit is not None and dimension(unit) is None:
             name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
         names.append(name or f"column {i + 1}")
+        if unit and units[i] and dimension(unit) and dimension(units[i] or "") and plain(unit) != plain(units[i] or ""):
+            torn.append(f"{name} in {unit}, and {units[i]} below")
         units[i] = unit if unit is not None else units[i]
     of_labview = labview_units(lines[:first], lambda line: split(line, delimiter), names)
-    return Headings(tuple(names), of_labview or tuple(units))
+    return Headings(tuple(names), of_labview or tuple(units), torn=tuple(torn))
 
 
 def _heading_cells(line: str, delimiter: str, width: int) -> list[str] | None:

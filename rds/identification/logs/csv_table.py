@@ -24,11 +24,14 @@ Progress = Callable[[int, int], None]
 _BLOCK = 1 << 22  # bytes
 _TAIL = 1 << 14  # bytes at the end in which a cut is looked for
 _REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")
+_DOTTED_DATE = re.compile(rb"(?<![\d.])(\d\d)\.(\d\d)\.(\d{4})[T ](?=\d\d:\d\d)")  # the day is first, always
+_COMMA_TIME = re.compile(rb"(?<!\d)(\d\d:\d\d:\d\d),(\d)")
 _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 _DAY = 86400.0  # s
 _WIDE, _TIMES_WIDER = 100, 10  # columns from which, and rows of which, a table lies on its side
 _END = b"EOF"  # the last line of an export of TwinCAT's scope
-_NULLS = [" ", *BLANKS, *(word.upper() for word in BLANKS), "NaN", "Null", "None", "Inf", "+Inf", "-Inf"]
+_SPELLED = (str.lower, str.upper, str.capitalize)
+_NULLS = [" ", "NaN", "+Inf", "-Inf", *(spelled(word) for word in BLANKS for spelled in _SPELLED)]
 
 
 def read_csv(
@@ -82,6 +85,11 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
             break
         except _NotNumber as error:
             words.add(error.column)
+    found_late = {row for i, (row, _) in texts.items() if i not in layout.words}
+    if not values and len(found_late) == 1:
+        cells = ", ".join(repr(texts[i][1]) for i in sorted(texts) if i not in layout.words)
+        what = f"data row {found_late.pop() + 1} holds words in every column ({cells:.80}): another table begins there"
+        raise InputError(f"{what}; put each recording into a file of its own, or remove the line", str(path))
     if remarks:
         findings.append(Finding("comments", f"{remarks} remarks between the rows were passed over"))
     rows = max(map(len, values.values()), default=0)
@@ -90,6 +98,9 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
     if layout.passed:
         what = f"a line above the first row of data has numbers, too, and was passed over: {layout.passed[:80]!r}"
         findings.append(Finding("headings", what, Gravity.WARNING))
+    if layout.torn:
+        what = f"the heading says {'; '.join(layout.torn[:8])}: the heading was followed; "
+        findings.append(Finding("units", what + "give the unit in a map if the row below is right", Gravity.WARNING))
     if layout.scaled:
         what = f"{', '.join(layout.scaled[:8])}: a factor or an offset stands in the head of the file, which does not "
         what += "tell whether it is applied; compare the values with what was displayed, and give scale in a map if not"
@@ -228,6 +239,7 @@ class _Rows:
         self._delimiter, self._width = layout.delimiter.encode(), len(layout.names) if layout.ragged else 0
         for _ in range(layout.first):
             self._file.readline()  # within what the layout was found in
+        self._stamped = bool(layout.dates)
         self.remarks, self.closed = 0, False
 
     @property
@@ -245,6 +257,9 @@ class _Rows:
             data += self._rest_of_line()
             data, remarks = _REMARK.subn(b"", data)
             self.remarks += remarks
+            if self._stamped:  # as Germans and Python's logging write them
+                data = _DOTTED_DATE.sub(rb"\3-\2-\1 ", data)
+                data = data if self._delimiter == b"," else _COMMA_TIME.sub(rb"\1.\2", data)
             if self._spaces:
                 data = re.sub(rb"[ \t]+", b" ", _SPACES.sub(b"", data))
             if self._width:

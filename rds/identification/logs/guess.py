@@ -43,7 +43,12 @@ _WORDS: Mapping[str, frozenset[str]] = {
     ),
 }
 # never what was measured
-_OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration", "accel", "acc"))
+_OTHERS = _words(
+    "modelled simulated model error err acceleration accel acc difference diff deviation lag temperature temp "
+    "fehler abweichung regelabweichung schleppfehler schleppabstand temperatur"
+)
+# voltages that drive nothing
+_SUPPLIES = _words("supply bus battery batt vbus vbat dclink sensor zwischenkreisspannung versorgungsspannung batterie")
 _ACTING = (("voltage",), ("force", "torque"), ("current",))
 _RISING = 0.9  # of the steps of a time go up
 _NO_LOG = "it is no log over time"
@@ -65,6 +70,7 @@ def guess(table: Table) -> Guess:
     time, problem = _time(table)
     if problem:
         spoiled = _spoiled(table, "time")
+        problem += _in_turn(table)
         return Guess(None, spoiled or problem, is_log=not spoiled and problem[: len(_NO_LOG)] != _NO_LOG)
     said = ["each signal has its own times"]
     if time:
@@ -211,6 +217,19 @@ def _why_no_time(column: Column) -> str:
     return f"{column.name!r} does not increase from row to row ({rows} rows)"
 
 
+def _in_turn(table: Table) -> str:
+    """What to do about a table whose rows hold one signal after another, each named in its row; "" of another table."""
+    name = next((c.name for c in table.columns.values() if c.text is not None and c.text[1][:1].isalpha()), None)
+    times = [c for c in table.columns.values() if c.text is None and _role(c.name) == "time" and _is_coarse(c)]
+    values = [c for c in table.columns.values() if c.text is None and c not in times]
+    if name is None or not times or not values:
+        return ""
+    return (
+        f"; but where {name!r} says in each row which signal it holds, give each signal a column of its own, in Python "
+        f"by `pandas.read_csv(FILE).pivot(index={times[0].name!r}, columns={name!r}, values={values[0].name!r})`"
+    )
+
+
 def _is_coarse(column: Column) -> bool:
     """Whether the values go up, and stay the same between."""
     steps = np.diff(column.values[np.isfinite(column.values)])
@@ -238,6 +257,13 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     kind = next((report for of, report in kinds.items() if of in units), None)
     if kind is not None and (numbered or in_time):
         sentence += f"; such readings are for `rds report {kind}`"
+    rising = [
+        c.name for c in columns if c.unit is None and _rises(c.values) and (_role(c.name) is None or _is_even(c.values))
+    ]
+    rising = [name for name in rising if name.lower() not in _ORDINALS]
+    if kind is None and rising:
+        called = ", ".join(map(repr, rising[:3])) + (" ..." if len(rising) > 3 else "")
+        sentence += f"; where the time is {called}, say so in a map, with its unit: column and unit under [time]"
     return sentence + "; if its rows are equally spaced in time, say so in a map: rate = 1000.0 (Hz) under [time]"
 
 
@@ -248,6 +274,12 @@ def _are_alike(a: Column, b: Column) -> bool:
 def _rises(values: np.ndarray) -> bool:
     steps = np.diff(values[:100_000])
     return len(steps) > 0 and bool(np.mean(steps > 0.0) >= _RISING)
+
+
+def _is_even(values: np.ndarray) -> bool:
+    """Whether all steps are alike, as of the time in the first row of a matrix that Simulink has saved."""
+    steps = np.diff(values[:100_000])
+    return len(steps) > 0 and bool(np.all(np.abs(steps - np.median(steps)) < 1e-3 * abs(np.median(steps))))
 
 
 def _tokens(name: str) -> list[str]:
@@ -333,10 +365,13 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
     dimensions = DIMENSIONS[quantity]
     fits = [c for c in columns if dimension(c.unit or "") in dimensions]
     if quantity == "command":  # a voltage where there is one, else the torque or force of a drive, else its current
+        fits = [c for c in fits if not _SUPPLIES & {word.lower() for word in _tokens(c.name)}]
         fits = next((of for d in _ACTING if (of := [c for c in fits if dimension(c.unit or "") in d])), [])
     if quantity == "reference":
-        return [c for c in fits if _role(c.name) == "reference"]
-    fits = [c for c in fits if _role(c.name) != "reference" or quantity == "command"]
+        return [c for c in fits if _role(c.name) in ("reference", "command")]  # a command position is one
+    if quantity != "command":
+        others = ("reference", "command") if quantity in ("position", "velocity") else ("reference",)
+        fits = [c for c in fits if _role(c.name) not in others]
     if quantity == "position":  # a speed is a spindle's position only where it is called so, or nothing else is there
         places = [c for c in fits if dimension(c.unit or "") != "angular speed"]
         fits = places or fits

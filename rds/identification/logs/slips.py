@@ -14,6 +14,7 @@ from rds.machines.machine import Axis
 
 _CLEAR = 8.0  # robust standard deviations of what a step differs from its neighbours
 _STEPS = 4.0  # encoder steps
+_FAINT, _FAST = 0.05, 0.999  # of what the axis moves in a sample where it is fast: ripples of a filter are less
 _BESIDE = 3.0  # times what the steps before and after differ by
 _NEIGHBOURS = 4  # steps to each side
 _FEW = 20  # leaps, beyond which it is noise of an odd kind
@@ -34,7 +35,8 @@ def leaps(log: Log, axis: Axis | None) -> list[Finding]:
     curve = rate[1:-1] - 0.5 * (rate[:-2] + rate[2:])
     period = log.sample_period
     usual = 1.4826 * float(np.median(np.abs(curve))) if len(curve) else 0.0
-    least = max(_CLEAR * usual, _STEPS * (log.resolution or 0.0) / period)
+    faint = _STEPS * log.resolution / period if log.resolution else _FAINT * float(np.quantile(np.abs(rate), _FAST))
+    least = max(_CLEAR * usual, faint)
     candidates = np.flatnonzero(np.abs(curve) > least) + 1
     found = [(k, size) for k in candidates[: 50 * _FEW].tolist() if abs(size := _outside(rate, k)) > least]
     # a reading that is off by itself leaps there and back

@@ -15,6 +15,8 @@ from rds.identification.logs.csv_headings import name_and_unit
 from rds.identification.logs.log import Finding
 
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}([ T,]|$)")
+_OF_DAY = re.compile(r"(\d+ days? )?\d{1,2}:\d\d\b")
+_OTHER_THOUSANDS = re.compile(r"[+-]?\d{1,3}([.'\u2019\u00a0\u202f ])\d{3}(\1\d{3})*(,\d+|\.\d+)?")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 
@@ -84,6 +86,10 @@ def remedy(cell: str) -> str:
             "write dates as 2024-05-01 12:00:00.001 (of others nobody knows which is the day), times of day as "
             "12:00:00.001, or the time in s"
         )
+    if _OF_DAY.match(cell):
+        return "write times of day as 13:00:00.001 (24 hours, a point before the fraction), spans as s"
+    if _OTHER_THOUSANDS.fullmatch(cell):
+        return "every cell must be a number: export the file without a sign that parts the thousands"
     if _THOUSANDS.fullmatch(cell):
         return (
             "every cell must be a number: if this comma parts the thousands, export the file without it; if it is a "
@@ -91,7 +97,10 @@ def remedy(cell: str) -> str:
         )
     if _DECIMAL_COMMA.fullmatch(cell):
         return 'every cell must be a number: if this is a decimal comma, say decimal = "comma" under [table] in a map'
-    return "every cell must be a number: repair it or choose another column"
+    return (
+        "every cell must be a number: repair it or choose another column; where such cells are emptied, "
+        'blanks = "drop" in a map leaves their rows out'
+    )
 
 
 def since_first(stamps: np.ndarray) -> np.ndarray:

@@ -45,6 +45,10 @@ _EXPORTS = {
     ),
     ".json": "JSON: save the signals as columns of CSV, in Python by "
     "`pandas.DataFrame({'t [s]': ..., 'u [V]': ..., 'y [mm]': ...}).to_csv('log.csv', index=False)`",
+    **dict.fromkeys(
+        (".jsonl", ".ndjson"),
+        "lines of JSON: in Python `pandas.read_json(FILE, lines=True).to_csv('log.csv', index=False)`",
+    ),
     ".svdx": "TwinCAT's scope: export it as CSV, with semicolons",
     **dict.fromkeys((".isf", ".wfm", ".bin", ".psdata"), "an oscilloscope's own: save its channels as CSV"),
     ".fig": "a figure of MATLAB: save the vectors that it shows as a MAT file",

@@ -11,6 +11,7 @@ from rds.core.errors import InputError
 from rds.identification.logs.log import Finding, Gravity
 
 _GAP = 1.5  # sample periods: a longer step has samples missing in it
+_HOUR = 3600.0  # s
 _ROUNDING = 1e-3  # of the period: less is rounding, and no jitter
 
 
@@ -36,10 +37,16 @@ def time_base(time: np.ndarray, jitter_limit: float, duplicates: str, gaps: str,
     back = np.flatnonzero(steps < 0.0)
     if len(back):
         k = int(back[0]) + 1
+        remedy = (
+            "a clock that is set back by an hour does so, as where summer time ends: log UTC, or give the later rows "
+            "their hour"
+            if len(back) == 1 and _HOUR - 60.0 < -steps[k - 1] < _HOUR
+            else "is the column the time, and is it one recording? Of a counter that begins again, say in the map at "
+            "which number, as in wrap = 65536 under [time]"
+        )
         raise InputError(
-            f"time goes back at sample {k}, from {time[k - 1]:.9g} to {time[k]:.9g} s ({len(back)} such steps); is the "
-            "column the time, and is it one recording? Of a counter that begins again, say in the map at which number, "
-            "as in wrap = 65536 under [time]",
+            f"time goes back at sample {k}, from {time[k - 1]:.9g} to {time[k]:.9g} s ({len(back)} such steps); "
+            + remedy,
             where,
         )
     findings: list[Finding] = []
