@@ -33,7 +33,7 @@ from rds.grading.course.groups import by_group
 from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Grade, Status
 from rds.grading.intake import Intake, collect
-from rds.grading.intake.times import NOT_UNDERSTOOD
+from rds.grading.intake.layouts import NOT_UNDERSTOOD
 from rds.grading.review.publish import SIMILARITY, publish
 from rds.grading.sandbox import available
 

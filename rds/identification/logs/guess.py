@@ -262,8 +262,8 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     ]
     rising = [name for name in rising if name.lower() not in _ORDINALS]
     if kind is None and rising:
-        called = ", ".join(map(repr, rising[:3])) + (" ..." if len(rising) > 3 else "")
-        sentence += f"; where the time is {called}, say so in a map, with its unit: column and unit under [time]"
+        named = ", ".join(map(repr, rising[:3])) + (" ..." if len(rising) > 3 else "")
+        sentence += f"; where the time is {named}, say so in a map, with its unit: column and unit under [time]"
     return sentence + "; if its rows are equally spaced in time, say so in a map: rate = 1000.0 (Hz) under [time]"
 
 
