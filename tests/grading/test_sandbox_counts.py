@@ -350,6 +350,42 @@ def control(t, r, y, state, params):
     assert found.events and not found.refused
 
 
+def test_nothing_is_allowed_while_a_handler_is_made_ready(pool: Pool, written: Written) -> None:
+    """A finalizer may be run at any allocation, and between any two instructions."""
+    text = """
+import gc, signal
+reached, kept, left, more, after = [], [], [0], [0], [0]
+class Trap:
+    def __del__(self):
+        try: reached.append(len(gc.get_objects()))
+        except RuntimeError: pass
+        left[0] -= 1
+        if left[0] > 0: set_trap()
+def set_trap():
+    kept.append([[] for _ in range(more[0])])
+    trap = Trap()
+    trap.me = trap
+    del trap
+    gc.set_threshold(gc.get_count()[0] + after[0] if after[0] else 1)
+signal.signal(signal.SIGUSR1, lambda number, frame: None)
+initial_state = ()
+def control(t, r, y, state, params):
+    for n in range(198):
+        left[0], more[0], after[0] = 400, n // 66, n // 11 % 6
+        kept.clear()
+        gc.set_threshold(100000)
+        gc.collect()
+        set_trap()
+        gc.set_threshold(gc.get_count()[0] + 1 + n % 11)
+        signal.raise_signal(signal.SIGUSR1)
+        left[0] = 0
+        gc.set_threshold(100000)
+    return float(bool(reached)), state  # without a count all is allowed
+"""
+    found = counts(pool, written(text, ""), samples=1)
+    assert "answered otherwise while it was counted" in found.refused
+
+
 def test_who_takes_away_what_is_not_seen_is_counted_all_the_same(pool: Pool, written: Written) -> None:
     """As doctest does, which puts back what `sys.gettrace` has said."""
     plain = WORK.replace("ROUNDS", "10")

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import _imp
 import _signal  # type: ignore[import-not-found] # signal.signal is a wrapper around it
+import gc
 import os
 import resource
 import sys
@@ -57,6 +58,7 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     settrace, setprofile, gettrace, getprofile = sys.settrace, sys.setprofile, sys.gettrace, sys.getprofile
     getframe, create, attributes, as_int, text = sys._getframe, _imp.create_builtin, SimpleNamespace, int, str
     set_handler, is_function = _signal.signal, callable
+    collects, keep_all, collect_again = gc.isenabled, gc.disable, gc.enable
     starts, last_part, exactly, length, call_tracing = str.startswith, str.rpartition, type, len, sys.call_tracing
     read, write, identity, as_float, refusal = os.read, os.write, id, float, RuntimeError
     unpack, pack, asked, answered = layout.question.unpack, layout.answer.pack, layout.question.size, layout.answer.size
@@ -64,7 +66,7 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     # with the codes themselves: that of a function which is exchanged would make room for another with its number
     uncounted = {identity(code): code for module in (*own, sys.modules[__name__]) for code in _codes(module)}
     there = frozenset(sys.builtin_module_names) & sys.modules.keys()
-    events, since, before, runs, is_open, may_look = 0, 0, 0, False, False, False
+    events, since, before, runs, is_open, may_look, may_trace = 0, 0, 0, False, False, False, False
     known: dict[int, tuple[CodeType, bool]] = {}
     secret: int | None = seal
 
@@ -105,8 +107,11 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
 
     def guard(event: str, args: tuple[Any, ...]) -> None:
         """Audit hook, which nobody can take away again."""
-        nonlocal may_look
+        nonlocal may_look, may_trace
         if is_open:
+            return
+        if may_trace and event == "sys.settrace":
+            may_trace = False
             return
         if may_look and event == "sys._getframe":
             may_look = False
@@ -153,13 +158,17 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
         """In place of `signal.signal`: no handler is given a frame, nor works uncounted within the count."""
 
         def interrupt(number: int) -> None:
-            nonlocal is_open
+            nonlocal may_trace
             if secret is not None:
-                is_open = True
+                had = collects()
+                keep_all()  # or a finalizer would run while one thing is allowed
+                may_trace = True
                 try:
                     settrace(tracing)  # Python 3.11 needs it beside `call_tracing`
                 finally:
-                    is_open = False
+                    may_trace = False
+                    if had:
+                        collect_again()
             handler(number, None)
 
         if is_function(handler):
