@@ -24,7 +24,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.limits import read_limited
-from rds.identification.logs.csv_layout import BLANKS
+from rds.identification.logs.csv_cells import BLANKS
 from rds.identification.logs.log import Finding
 from rds.identification.logs.table import Column, Table
 from rds.identification.logs.units import factor, unit_of_name

@@ -7,7 +7,6 @@ is that under which most lines read as rows of numbers.
 from __future__ import annotations
 
 import codecs
-import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,17 @@ from math import isfinite
 from pathlib import Path
 
 from rds.core.errors import InputError
+from rds.identification.logs.csv_cells import (
+    BLANKS,
+    CLOCK,
+    COMMENTS,
+    DATE,
+    DELIMITERS,
+    are_numbers,
+    is_comment,
+    is_number,
+    split,
+)
 from rds.identification.logs.csv_headings import Headings, alternates, labelled_headings, labview_units, name_and_unit
 from rds.identification.logs.units import dimension, plain
 from rds.results.units import split_heading
@@ -22,20 +32,8 @@ from rds.results.units import split_heading
 _FEW = 20  # rows of data that are looked at for how they end
 HEAD = 1 << 16  # bytes looked at
 _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
-COMMENTS = ("#", "%", "//", "!")
-DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
-BLANKS = frozenset(
-    (
-        *("", "nan", "+nan", "-nan", "na", "n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf"),
-        *("∞", "-∞", "+∞", "over", "ol", "err", "error", "bad"),  # of meters and oscilloscopes, beyond their range
-        *("#n/a", "#div/0!", "#value!", "#num!", "#ref!"),  # of spreadsheets
-        *("-1.#ind", "1.#qnan", "1.#inf", "-1.#inf", "-nan(ind)", "nan(ind)"),  # of C on Windows
-    )
-)
 _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
-_DATE = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
-_CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
 _RIGOL = re.compile(
     r"X,(CH\d,)+Start,Increment,?\s*"
 )  # an oscilloscope's first line; the second has units, start, step
@@ -88,7 +86,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
             remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
         if shown.lstrip().startswith("{"):
             remedy = "its lines are JSON: in Python `pandas.read_json(FILE, lines=True).to_csv('log.csv', index=False)`"
-        if any(_are_numbers(line.split(":")) for line in lines):
+        if any(are_numbers(line.split(":")) for line in lines):
             remedy += "; its cells seem to stand between colons: export it with semicolons between them"
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
     _, width, mark, point, first = best
@@ -109,8 +107,8 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     if labelled:  # most rows may be shorter, as channels end one after another
         first = _below_labels(lines, first, mark, point, width)
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
-    stamps = {i: found for i in range(width) for row in body[:1] if (found := _DATE.fullmatch(row[i]))}
-    clocks = frozenset(i for i in range(width) for row in body[:1] if _CLOCK.fullmatch(row[i]))
+    stamps = {i: found for i in range(width) for row in body[:1] if (found := DATE.fullmatch(row[i]))}
+    clocks = frozenset(i for i in range(width) for row in body[:1] if CLOCK.fullmatch(row[i]))
     dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()} | dict.fromkeys(clocks, False)
     words = frozenset(
         i
@@ -164,28 +162,6 @@ def _worth_trying(lines: Sequence[str]) -> list[str]:
     return [mark for mark in DELIMITERS.values() if mark in present or mark in absent[:1]]
 
 
-def split(line: str, delimiter: str) -> list[str]:
-    """The cells of a line, without blanks around them."""
-    if delimiter == " ":
-        return line.split()
-    if '"' in line:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
-    return [cell.strip() for cell in line.split(delimiter)]
-
-
-def is_number(cell: str, decimal: str) -> bool:
-    """Whether a cell is a number; neither NaN nor infinity is."""
-    if decimal != ".":
-        if "." in cell:
-            return False
-        cell = cell.replace(decimal, ".")
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return cell.lower() not in BLANKS and "_" not in cell
-
-
 def in_rows(what: str, path: Path) -> InputError:
     """The error that the signals of a table stand in rows, as NumPy writes an array of (signals, samples)."""
     return InputError(
@@ -193,15 +169,6 @@ def in_rows(what: str, path: Path) -> InputError:
         "`numpy.savetxt('log.csv', numpy.loadtxt(FILE, delimiter=',').T, delimiter=',', header='t [s],u [V],y [mm]')`",
         str(path),
     )
-
-
-def _are_numbers(cells: Sequence[str]) -> bool:
-    return len(cells) > 1 and all(is_number(cell.strip(), ",") or is_number(cell.strip(), ".") for cell in cells)
-
-
-def is_comment(line: str) -> bool:
-    """Whether a line is a remark, and not a row."""
-    return line.lstrip().startswith(COMMENTS)
 
 
 def _head(path: Path) -> tuple[list[str], str]:
@@ -242,9 +209,7 @@ def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int,
     for number, line in enumerate(lines):
         if line.strip() and not is_comment(line):
             cells = split(line, delimiter)
-            kinds = [
-                is_number(cell, decimal) or bool(_DATE.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in cells
-            ]
+            kinds = [is_number(cell, decimal) or bool(DATE.fullmatch(cell) or CLOCK.fullmatch(cell)) for cell in cells]
             blanks = sum(cell.lower() in BLANKS for cell in cells)
             if delimiter in ", " and _OTHER_MARK.search(line):
                 continue

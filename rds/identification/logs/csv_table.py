@@ -15,7 +15,8 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.core.limits import LINE, lifted, refusal
-from rds.identification.logs.csv_layout import BLANKS, Layout, in_rows, is_number, sniff, split
+from rds.identification.logs.csv_cells import BLANKS, is_number, split
+from rds.identification.logs.csv_layout import Layout, in_rows, sniff
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.logs.table import Column, Table, since_first
 from rds.identification.logs.units import factor, unit_of_name

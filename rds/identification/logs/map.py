@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
-from rds.identification.logs.csv_layout import DELIMITERS
+from rds.identification.logs.csv_cells import DELIMITERS
 from rds.identification.logs.map_axis import AxisMap, axes_of, scale_of, unit_of
 from rds.identification.logs.map_file import JITTER_LIMIT, MAP
 from rds.machines import load_machine

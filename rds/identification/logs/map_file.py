@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import inf
 
 from rds.core.quantities import AnyValue, Choice, Declaration, Flag, Items, Quantity, Table, Text
-from rds.identification.logs.csv_layout import DELIMITERS
+from rds.identification.logs.csv_cells import DELIMITERS
 from rds.identification.logs.log import QUANTITIES
 
 JITTER_LIMIT = 0.1  # of the sample period: how far a step of the time may be from it

@@ -1,0 +1,52 @@
+"""The cells of a text table: how a line is cut into them, and which are numbers, dates, blanks or remarks."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+
+COMMENTS = ("#", "%", "//", "!")
+DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
+BLANKS = frozenset(
+    (
+        *("", "nan", "+nan", "-nan", "na", "n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf"),
+        *("∞", "-∞", "+∞", "over", "ol", "err", "error", "bad"),  # of meters and oscilloscopes, beyond their range
+        *("#n/a", "#div/0!", "#value!", "#num!", "#ref!"),  # of spreadsheets
+        *("-1.#ind", "1.#qnan", "1.#inf", "-1.#inf", "-nan(ind)", "nan(ind)"),  # of C on Windows
+    )
+)
+DATE = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
+
+
+def split(line: str, delimiter: str) -> list[str]:
+    """The cells of a line, without blanks around them."""
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell is a number; neither NaN nor infinity is."""
+    if decimal != ".":
+        if "." in cell:
+            return False
+        cell = cell.replace(decimal, ".")
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return cell.lower() not in BLANKS and "_" not in cell
+
+
+def are_numbers(cells: Sequence[str]) -> bool:
+    """Whether there are two cells or more, and each is a number with a point or a comma in it, or without."""
+    return len(cells) > 1 and all(is_number(cell.strip(), ",") or is_number(cell.strip(), ".") for cell in cells)
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is a remark, and not a row."""
+    return line.lstrip().startswith(COMMENTS)
