@@ -19,7 +19,10 @@ def report(
             "unsynchronized-rapids or path-error."
         ),
     ],
-    data: Annotated[list[Path] | None, typer.Argument(help="Data files: CSV tables or bus logs.")] = None,
+    data: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Data files: CSV tables or bus logs; oacs:O32 is a table of oacs-thesis's appendices."),
+    ] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="An option of the report; `--options` lists them."),

@@ -13,6 +13,7 @@ from pathlib import Path
 from rds.core.errors import InputError
 from rds.core.registry import Registry
 from rds.results.reports.content import Report, Table
+from rds.results.reports.oacs import data_file
 from rds.results.reports.settings import Setting, read_settings, settings_rows
 from rds.results.reports.write import write
 
@@ -38,7 +39,7 @@ __all__ = ["KINDS", "Report", "Setting", "Table", "make_report", "option_table",
 
 
 def make_report(kind: str, files: Sequence[str | Path], options: Mapping[str, str | float] | None = None) -> Report:
-    """The report of this kind from data files.
+    """The report of this kind from data files, or from a table of oacs-thesis's appendices, as `oacs:O32`.
 
     `options` are those of `options_of(kind)`, as text or numbers. Raises InputError for an unknown kind or option, a
     value out of bounds, or data that can't be read: with the file, the line and the column, the value and the remedy.
@@ -47,7 +48,7 @@ def make_report(kind: str, files: Sequence[str | Path], options: Mapping[str, st
     if not files:
         raise InputError(f"a report on {kind} needs data; name at least one file")
     settings = read_settings(options or {}, module.SETTINGS, f"report {kind}")
-    made: Report = module.report([Path(file) for file in files], settings)
+    made: Report = module.report([data_file(file) for file in files], settings)
     return made
 
 
