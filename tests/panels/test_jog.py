@@ -67,6 +67,14 @@ def test_an_axis_moves_while_held_and_by_step(open_page: Callable[..., Any]) -> 
     page.wait_for_selector('button[aria-label="X plus"].rds-order')  # the choice has come back: a press is a step
     plus.press("Enter")
     page.wait_for_function(f"parseFloat(document.querySelector('.rds-jog-at').innerText) > {let_go + 9.95}")
+    for said, shown in (("200", "X would leave its travel, -75 to 75 mm, at 200.000"), ("-1.5", "")):
+        field = page.locator('.rds-field:has(.rds-label:has-text("Position")) input')
+        field.fill(said)
+        field.press("Enter")
+        page.click('button:text-is("Go")')
+        if shown:
+            page.wait_for_selector(f'.rds-notice-error:has-text("{shown}")')
+    page.wait_for_function("Math.abs(parseFloat(document.querySelector('.rds-jog-at').innerText) + 1.5) < 0.02")
     page.click("button.rds-stop")
     page.wait_for_selector('.rds-notice:has-text("modules are at zero volts")')
     page.wait_for_selector('button[aria-label="X plus"]:disabled')

@@ -60,9 +60,13 @@ class JogView:
         fields = [FieldView(jog.choices, "home_axis"), FieldView(jog.choices, "method")]
         self._homing = group("Homing of drives", *fields, row(self._find), self._not_homed)
         motion = ["way", "step", "speed", *(["spindle_speed"] if jog.spindles else [])]
+        tip = "Move the axis to the position; Stop ends that"
+        self._go = order(shell, "Go", tip, self.go, say)
+        goal = [FieldView(jog.choices, name) for name in (("goal_axis", "goal") if jog.axes else ())]
         side = [
             group("The machine", row(self._take, self._free), row(self._rest, self._home)),
             group("Motion", *(FieldView(jog.choices, name) for name in motion)),
+            *([group("To a position", *goal, row(self._go))] if goal else []),
             self._homing,
         ]
         rows = [
@@ -94,6 +98,10 @@ class JogView:
         self.jog.halt()
         for buttons in self._turns.values():
             buttons.forget()
+
+    def go(self) -> None:
+        """Move the axis that is chosen to the position."""
+        self.jog.go(self.jog.choices["goal_axis"], self.jog.choices["goal"])
 
     def find_home(self) -> None:
         """Home the axis that is chosen, or all."""
@@ -142,7 +150,7 @@ class JogView:
         ready, busy = jog.ready, bool(jog.homing)
         self._take.disabled, self._free.disabled = ready, not ready
         self._rest.disabled = not ready
-        self._home.disabled = self._find.disabled = not ready or busy
+        self._home.disabled = self._find.disabled = self._go.disabled = not ready or busy
         self._homing.layout.display = None if jog.finds_home else "none"
         left = ", ".join(name for name in jog.axes if name not in jog.homed and name not in jog.left_out)
         self._not_homed.value = f"Not homed since the machine was taken: {escape(left)}" if left else "All are homed."

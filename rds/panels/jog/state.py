@@ -50,6 +50,9 @@ def _fields(axes: Mapping[str, JogAxis], spindles: Mapping[str, JogSpindle]) -> 
         most = max(max(map(abs, each.speeds)) for each in spindles.values())
         tip = "Of the spindle; the button chooses the way round"
         yield Number("spindle_speed", "Spindle speed", tip, 0.1 * most, unit="rev/min", above=0.0, high=most)
+    if axes:
+        yield Choice("goal_axis", "Axis", "Which one goes", next(iter(axes)), {name: name for name in axes})
+        yield Number("goal", "Position", "Where it goes, at the speed above; within its travel", 0.0, unit="mm or °")
     names = {"all": "all"} | {name: name for name in axes}
     yield Choice("home_axis", "Axes to home", "One after the other, Z first; the others have no power", "all", names)
     tip = "Homing mode of CiA 402 drives, object 0x6098; an axis whose [bus.cia402] table gives one keeps that"
@@ -247,7 +250,7 @@ class Jog:
         way = 1 if goal > place else -1
         if not (goal - known.end(place, way)) * way <= 0.0:  # false for NaN too
             raise InputError(
-                f"{axis} would leave its travel, {low:g} to {high:g} {known.unit}, at {goal:.3f}; choose a smaller step"
+                f"{axis} would leave its travel, {low:g} to {high:g} {known.unit}, at {goal:.3f}; choose one inside"
             )
         if speed is not None:
             speed = Number("speed", "Speed", "", unit=f"{known.unit}/s", above=0.0, high=known.speed).check(speed)
