@@ -76,6 +76,21 @@ def test_an_assembly_error_is_added_to_the_numbers(tmp_path: Path) -> None:
     np.testing.assert_allclose(other.kinematics.forward([20.0]), right.kinematics.forward([30.0]), atol=1e-12)
 
 
+@pytest.mark.parametrize(("theta", "d", "a", "alpha"), [(20.0, 40.0, 150.0, 90.0), (-75.0, -3.0, 12.5, -30.0)])
+def test_a_row_of_denavit_and_hartenberg_is_two_links(
+    tmp_path: Path, theta: float, d: float, a: float, alpha: float
+) -> None:
+    """Equation 7.8 of oacs-thesis, with the axis adding to θ, and to d."""
+    arm = link(name="arm", angles=[alpha, 0.0, 0.0], offset=[a, 0.0, 0.0])
+    stands = {"angles": [0.0, 0.0, theta], "offset": [0.0, 0.0, d]}
+    for joint, axis, q in (("ZA", "A", 33.0), ("Z", "Z", 7.0)):
+        own = machine(tmp_path, axis, link(axis=axis, joint=joint, **stands) + arm)
+        angle, shift = np.radians(theta + (q if axis == "A" else 0.0)), d + (q if axis == "Z" else 0.0)
+        (c, s), (ca, sa) = (np.cos(angle), np.sin(angle)), (np.cos(np.radians(alpha)), np.sin(np.radians(alpha)))
+        meant = [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, shift], [0, 0, 0, 1]]
+        np.testing.assert_allclose(own.kinematics.forward({axis: q}), meant, atol=1e-9)
+
+
 X = link(axis="X", joint="X")
 
 

@@ -27,9 +27,11 @@ def test_its_code_runs(block) -> None:
 
 
 def test_its_links_are_read(tmp_path: Path) -> None:
-    (toml,) = (block.text for block in blocks("docs/machines.md") if block.language == "toml")
-    kinematics = machine(tmp_path, "XZ", toml).kinematics
+    table, arm = (block.text for block in blocks("docs/machines.md") if block.language == "toml")
+    kinematics = machine(tmp_path, "XZ", table).kinematics
     np.testing.assert_allclose(kinematics.forward({"X": 5.0, "Z": 7.0})[:3, 3], [5.0, 0.0, 7.0 - 50.0])
+    pose, angle = machine(tmp_path, "A", arm).kinematics.forward({"A": 10.0}), np.radians(30.0)
+    np.testing.assert_allclose(pose[:3, 3], [150.0 * np.cos(angle), 150.0 * np.sin(angle), 40.0])
 
 
 def test_its_script_is_the_paper_s_as_printed() -> None:
