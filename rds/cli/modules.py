@@ -246,6 +246,24 @@ def stop(
 
 
 @module_app.command()
+def switch(
+    context: typer.Context,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    experiment: Experiment = None,
+    json: Json = False,
+) -> None:
+    """Turn the motion under way round, from a second terminal: what is left of the way, the other way."""
+    with _module(context, (interface, channel, experiment, bitrate)) as module:
+        module.switch_direction()
+    if json:
+        print_json({"switched": context.obj})
+    else:
+        typer.echo("switched its direction")
+
+
+@module_app.command()
 def reset(
     context: typer.Context,
     interface: Interface = None,
@@ -284,21 +302,28 @@ def step(
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
-    """Step the set point, record the response and plot it."""
+    """Step the set point, record the response and plot it; tell its rise time, overshoot, settling and error."""
     with _moving(context, (interface, channel, experiment, bitrate)) as module, progress_bars() as bar:
         folder = folder_for(out, force)
         result = module.step(by, period, settled=settled, progress=bar(f"step by {by:g}"))
         bar("save")
+        from rds.bus.modules.oacs.tuning import quality
         from rds.core.atomic import write_whole
         from rds.panels.design.step_plot import plot
         from rds.results.files import save_all
 
         files = {kind: str(path) for kind, path in save_all(result, folder).items()}
         files["plot"] = str(write_whole(folder / "step.png", plot(result).png()))
+    found = quality(result, result.axes[0])
+    unit = result.units[f"{result.axes[0]}_measured"]
     if json:
-        print_json({"samples": len(result), "notes": result.meta.get("notes", []), "files": files})
+        response = {**found._asdict(), "unit": unit}
+        print_json(
+            {"samples": len(result), "response": response, "notes": result.meta.get("notes", []), "files": files}
+        )
     else:
         typer.echo(f"{len(result)} samples in {folder}")
+        typer.echo(found.words(unit))
         for note in result.meta.get("notes", []):
             typer.echo(f"note: {note}")
 

@@ -63,12 +63,15 @@ def test_an_axis_from_scan_to_emergency_stop(serve: Serve, rds: Rds, said: Rds, 
     assert said("module", 4, "tune") == tuned
     stepped = said("module", 4, "step", "--by", 2, "--out", tmp_path / "step")
     assert stepped["samples"] > 50 and Path(stepped["files"]["plot"]).stat().st_size > 5000
+    assert stepped["response"]["unit"] == "mm" and abs(stepped["response"]["steady_error"]) < 0.5
+    assert stepped["response"]["rise_time"] is None, "it ends 45 counts short of 338: never at 90 %"
     gains = said("module", 4, "tune", "--from-step", stepped["files"]["csv"], "--controller", "PID")
     assert gains["controller"] == "PID" and gains["Kp"] != 2.0 and gains["Kd"] > 0.0
     said("module", 4, "tune", "--set", "Kp=2", "--set", "Ki=0", "--set", "Kd=0", "--set", "kick=0")
     there = said("module", 4, "jog", "1", "--seconds", 0.3)
     assert there["unit"] == "mm" and there["position"] > 2.0
     assert "stands at" in rds("module", 4, "move", "--to", 2).stdout
+    assert "nothing moves" in refused(rds("module", 4, "switch"))
     assert said("module", 4, "stop") == {"stopped": 4}
     assert said("estop") == {"stopped": [2, 4]}
     assert "emergency stop is latched" in refused(rds("module", 4, "move", "--by", 1))

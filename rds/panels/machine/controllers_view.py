@@ -6,7 +6,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.bus.modules.oacs.tuning import ADVICE
+from rds.bus.modules.oacs.tuning import ADVICE, quality
 from rds.core.errors import InputError
 from rds.panels.kit.button import button, follow, order
 from rds.panels.kit.field import FieldView
@@ -117,8 +117,10 @@ class ControllersView:
         from rds.panels.design.step_plot import plot
 
         self.figure.show(plot(result), self._session)
+        name = result.axes[0]
         notes = "\n".join(map(str, result.meta.get("notes") or ()))
-        self.notice.say(notes or "the axis reached the point", "warning" if notes else "good")
+        measured = quality(result, name).words(result.units[f"{name}_measured"])
+        self.notice.say(f"{notes or 'the axis reached the point'}\n{measured}", "warning" if notes else "good")
 
     def _chosen(self, change: Any) -> None:
         if change["new"] is not None:

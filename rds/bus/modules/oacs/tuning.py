@@ -9,7 +9,7 @@ value after L + T:
     PID          1.2 T/L      0.6 T/L²        0.6 T
 
 The table holds for a process of gain 1; for a gain K (output per input) each is divided by K. Trial and error has its
-own table 10, here as `ADVICE`.
+own table 10, here as `ADVICE`; its four columns are what `quality` measures of a recorded step.
 """
 
 from __future__ import annotations
@@ -28,8 +28,28 @@ ADVICE = {  # what raising a gain does: rise time, overshoot, settling time, ste
     "Kd": ("hardly changes", "decreases", "decreases", "hardly changes"),
 }
 _SETTLED = 0.05  # the end's slope against the steepest one
+_BAND = 0.02  # of the step, about the point, in which a response counts as settled
 _OVERSHOOT = 0.05  # of the step
 _QUANTA = 10  # smallest steps of the record that a slope is taken over
+
+
+class Quality(NamedTuple):
+    """How well a response follows its step: the columns of table 10. None: it never came so far."""
+
+    rise_time: float | None  # s, from 10 % to 90 % of the step
+    overshoot: float  # % of the step, beyond the point
+    settling_time: float | None  # s, after which it stays within 2 % of the step
+    steady_error: float  # in the axis's unit: the point less where it stands at the end
+
+    def words(self, unit: str) -> str:
+        """One line."""
+        rise, settling = (
+            "never" if value is None else f"{value:.3g} s" for value in (self.rise_time, self.settling_time)
+        )
+        return (
+            f"rise time {rise}, overshoot {self.overshoot:.3g} %, settling time {settling}, "
+            f"steady error {self.steady_error:.3g} {unit}"
+        )
 
 
 class Gains(NamedTuple):
@@ -114,3 +134,35 @@ def _half_window(rise: np.ndarray) -> int:
 def gains_from_step(result: Result, axis: str, controller: str = "PID") -> Gains:
     """The gains of table 11 from a recorded step response (`remote.Module.step`) of `axis`."""
     return ziegler_nichols(reaction_curve(result["time"], result[f"{axis}_measured"]), controller)
+
+
+def quality(result: Result, axis: str) -> Quality:
+    """What table 10 speaks of, measured of a recorded step (`remote.Module.step`) of `axis`.
+
+    InputError for a record whose reference is where the axis was: no step.
+    """
+    t, y, point = (np.asarray(result[name]) for name in ("time", f"{axis}_measured", f"{axis}_reference"))
+    step = float(point[-1] - y[0])
+    if step == 0.0:
+        raise InputError("the record has no step: its reference is where the axis was; step it by more")
+    share = (y - y[0]) / step
+    reached = [_reached(t, share, level) for level in (0.1, 0.9)]
+    outside = np.flatnonzero(np.abs(share - 1.0) > _BAND)
+    settled = None if outside.size and outside[-1] == len(t) - 1 else float(t[outside[-1] + 1] if outside.size else 0.0)
+    return Quality(
+        None if reached[1] is None or reached[0] is None else reached[1] - reached[0],
+        max(0.0, 100.0 * (float(share.max()) - 1.0)),
+        settled,
+        float(point[-1] - y[-1]),
+    )
+
+
+def _reached(t: np.ndarray, share: np.ndarray, level: float) -> float | None:
+    """When the response first reaches this share of the step, s, between two samples."""
+    above = np.flatnonzero(share >= level)
+    if not above.size:
+        return None
+    k = int(above[0])
+    if k == 0:
+        return float(t[0])
+    return float(t[k - 1] + (level - share[k - 1]) / (share[k] - share[k - 1]) * (t[k] - t[k - 1]))
