@@ -71,7 +71,7 @@ ONLY = {
         *("rds.bus.modules.oacs.events", "rds.bus.modules.oacs.offers", "rds.bus.tools.link"),
     },
     ("bus", "network"): {"rds.network.clocks"},  # hosts keep the clocks of nodes together
-    # methods A, B and C are those of nodes on a serial line and on CAN
+    # methods A, B and C are those of nodes on a serial line and on CAN; distributed modules move by themselves
     ("nc.run", "bus"): {
         *(f"rds.bus.modules.dcs.{name}" for name in ("buffers", "build", "commands", "host", "methods", "port")),
         *("rds.bus.modules.segments", "rds.bus.modules.server_process", "rds.bus.hub.bus_settings"),
@@ -81,6 +81,7 @@ ONLY = {
             for name in ("frames", "module", "motion_frames", "motion_host", "motion_port")
         ),
         *("rds.bus.modules.rds", "rds.bus.medium.bits"),
+        *(f"rds.bus.modules.oacs.{name}" for name in ("codes", "module", "module_data", "pid", "several")),
     },
     ("jobs", "bus"): {"rds.bus.hub.runtime_folder"},  # where the user's sockets are
     ("interpolators", "results"): {"rds.results"},  # their tables

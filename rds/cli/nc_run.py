@@ -62,7 +62,7 @@ def run(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Of --interpolator: blu=0.001; with --method: noise=0.001, bitrate=500000, drift=X:80.",
+            help="Of --interpolator: blu=0.001; with --method: noise=0.001, bitrate=500000, drift=X:80; moves: Kp=2.",
         ),
     ] = None,
     acceleration: Annotated[
@@ -85,7 +85,8 @@ def run(
     method: Annotated[
         str | None,
         typer.Option(
-            help="By nodes on a serial line or CAN: A, B, C, C-thesis, B-free, C-free, several with commas, or all."
+            help="By nodes on a serial line or CAN: A, B, C, C-thesis, B-free, C-free, several with commas, or all; or "
+            "moves: distributed modules (oacs), each axis of a line from point to point by its own controller."
         ),
     ] = None,
     motion: Annotated[

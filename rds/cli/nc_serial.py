@@ -1,4 +1,7 @@
-"""`rds nc run --method`: a part program on nodes that carry it out: units of a serial line, or modules on CAN."""
+"""`rds nc run --method`: a part program on nodes that carry it out: units of a serial line, or modules on CAN.
+
+Methods A, B and C bring one motion to them; by `moves` each module goes from point to point by itself.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rds.nc.setup import Setup
+    from rds.results.reports.content import Report
 
 _MACHINE = "starmill"
 _ALL = ("A", "B", "C", "C-thesis")  # what `all` stands for
@@ -77,7 +81,7 @@ def run_methods(
         names = methods.split(",")
     if unknown := [name for name in names if name not in offered]:
         raise InputError(
-            f"--method {unknown[0]!r} is unknown; known: {', '.join(offered)}, several with commas, or all"
+            f"--method {unknown[0]!r} is unknown; known: {', '.join(offered)}, several with commas, or all; moves alone"
         )
     for name in names:
         check_method(name, how)
@@ -104,17 +108,7 @@ def run_methods(
     report = methods_report(runs, file, settings)
     files = [*write(report, out), *write_records(runs, out)] if out is not None else []
     astray = any(any(run.astray.values()) for run in runs)
-    if json:
-        print_json({**report.to_json(), "files": [str(path) for path in files]})
-        raise typer.Exit(int(astray))
-    from rds.cli.console import cell, show_table
-
-    for table in report.tables:
-        show_table(table.title, table.columns, [[cell(value) for value in row] for row in table.shown()], table.note)
-    for sentence in report.findings:
-        typer.echo(f"- {sentence}")
-    if files:
-        typer.echo(f"page: {files[0]}")
+    show_report(report, files, json)
     raise typer.Exit(int(astray))
 
 
@@ -138,6 +132,10 @@ def by_method(
 
     if others := [name for name, value in given.items() if value]:
         raise InputError(f"{', '.join(others)} is for runs in a loop; with --method the nodes move by themselves")
+    if method == "moves":
+        of_others = {"--motion": motion, "--rapids": rapids, "--baud": baud}
+        _run_moves(of_others, file, machine, mode, channel, option, out, json, setup)
+        return
     if rapids not in (None, "together", "each"):
         raise InputError(f"--rapids {rapids!r} must be together or each")
     if rapids == "each" and motion != "constant":
@@ -156,6 +154,64 @@ def by_method(
         out=out,
         json=json,
     )
+
+
+def _run_moves(
+    others: dict[str, Any],
+    file: Path,
+    machine: str | None,
+    mode: str | None,
+    channel: str | None,
+    option: list[str] | None,
+    out: Path | None,
+    json: bool,
+    setup: Setup,
+) -> None:
+    """By the controllers of distributed modules: a move command to each axis of each line."""
+    from rds.bus.tools.link import BUILTIN, pair
+    from rds.core.errors import InputError
+    from rds.machines import load_machine
+    from rds.modes import DEFAULT
+    from rds.modes.experiment.folder import require_writable
+    from rds.nc.run.module_moves import BITRATE, MACHINE, METHOD, moves_report, run_moves
+    from rds.results.reports.write import write
+
+    if given := [name for name, value in others.items() if value is not None]:
+        said = f"{', '.join(given)} is of methods A, B and C"
+        raise InputError(f"{said}; with --method {METHOD} each module has a controller of its own")
+    if out is not None:
+        require_writable(out)
+    words: dict[str, Any] = dict(map(pair, option or []))
+    bus = {"interface": words.pop("interface", BUILTIN), "bitrate": words.pop("bitrate", BITRATE)}
+    where, how = machine or MACHINE, mode or DEFAULT
+    with progress_bars() as bar:
+        run = run_moves(
+            *(file, load_machine(where), setup),
+            mode=how,
+            channel=channel,
+            tuning=words,
+            progress=bar("check"),
+            carried=bar("moves"),
+            **bus,
+        )
+    report = moves_report(run, file, {"machine": where, "mode": how, **words})
+    files = write(report, out) if out is not None else []
+    show_report(report, files, json)
+
+
+def show_report(report: Report, files: list[Path], json: bool) -> None:
+    """A report's tables and findings on the terminal, or as one JSON object, with the files that were written."""
+    if json:
+        print_json({**report.to_json(), "files": [str(path) for path in files]})
+        return
+    from rds.cli.console import cell, show_table
+
+    for table in report.tables:
+        show_table(table.title, table.columns, [[cell(value) for value in row] for row in table.shown()], table.note)
+    for sentence in report.findings:
+        typer.echo(f"- {sentence}")
+    if files:
+        typer.echo(f"page: {files[0]}")
 
 
 def only_with_method(given: dict[str, Any]) -> None:

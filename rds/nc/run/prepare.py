@@ -98,16 +98,22 @@ def prepare(
     """
     setup = setup or Setup()
     T = machine.sample_period if T is None else T
+    compiled = compiled_form(file, machine, setup, progress)
+    return (last or LastMade()).get(
+        (file, compiled.header, compiled.trailer, machine, T, profile, begin, steps),
+        lambda: _of_compiled(compiled, file, machine, setup, T, profile, begin, steps),
+    )
+
+
+def compiled_form(file: Path, machine: Machine, setup: Setup, progress: Progress | None = None) -> Compiled:
+    """The current compiled form beside the program in `file`, made if there is none; errors as those of `prepare`."""
     compiled = compiled_if_current(file, machine, setup)
     if compiled is None:
         validation, place = check_program(file, machine, setup, progress)
         if place is None:
             raise InputError(str(validation))
         compiled = open_compiled(place)
-    return (last or LastMade()).get(
-        (file, compiled.header, compiled.trailer, machine, T, profile, begin, steps),
-        lambda: _of_compiled(compiled, file, machine, setup, T, profile, begin, steps),
-    )
+    return compiled
 
 
 def _of_compiled(

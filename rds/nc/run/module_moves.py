@@ -1,0 +1,304 @@
+"""A part program by the controllers of distributed modules: a move command to each axis of a line (oacs-thesis, 8.7).
+
+A move command takes one axis to a point, at the speed that its module's controller makes of it. The axes of a line
+start together, each arrives by itself, and the next line begins when all have arrived. So no feed is kept, nor the way
+between two points: it is for positioning, as in drilling. What keeps to a path is commanded cyclically, in a loop.
+
+In a simulation the modules are virtual and time is that of their bus; a dial gauge says where each axis really is.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rds.bus.modules.oacs.codes import Kind, Select
+from rds.bus.modules.oacs.module import OacsModule
+from rds.bus.modules.oacs.module_data import ModuleData, read_modules
+from rds.bus.modules.oacs.pid import Tuning
+from rds.bus.modules.oacs.several import BusPort, Port, Several, VirtualPort
+from rds.bus.tools.link import BUILTIN, open_bus
+from rds.core.errors import InputError
+from rds.interpolators.motion.segments import AXES, JOINTS, LINE
+from rds.machines import Machine
+from rds.modes import EMULATION, SIMULATION, mode_names
+from rds.nc.path_block import Event, PathBlock
+from rds.nc.run.prepare import Progress, compiled_form
+from rds.nc.setup import Setup
+from rds.results.reports.content import Report, Table
+
+METHOD = "moves"
+MODES = tuple(name for name in mode_names("controller") if name != EMULATION)
+MACHINE = "mrmt-oacs"
+BITRATE = 500_000  # bit/s, of a real bus: appendix H
+COLUMNS = ("line", "axis", "unit", "from", "to", "arrived", "off", "gauge", "gauge off", "time [s]")
+_SLACK = 10.0  # s that a motion may take beyond twice its way at the slowest speed
+_SLOWEST = 0.1  # unit/s, where a module says no speed
+_NOTE = (
+    "Arrived: where the axis stands by its module's encoder; gauge: where it really is, by a dial gauge at the "
+    "simulated axis. Off: from the point that the line says. Time: from the command to its last acknowledgement."
+)
+_NOT_CARRIED = {"stop": "M0 and M1", "tool": "tool changes", "coolant": "coolant", "output": "outputs"}
+
+
+@dataclass(frozen=True)
+class AxisMove:
+    """One axis in one line, axis units and s. `gauge` is where the axis really was; None where nobody measured."""
+
+    line: int
+    axis: str
+    unit: str
+    start: float
+    end: float
+    arrived: float
+    gauge: float | None
+    seconds: float
+
+    @property
+    def off(self) -> float:
+        """How far from the point it stands by its module; positive beyond in the axis's direction."""
+        return self.arrived - self.end
+
+
+@dataclass(frozen=True)
+class MovesRun:
+    """A program carried out by move commands: each axis of each line, the time that it took, s, and what was left out.
+
+    `accuracy` is what the module of each axis promises, in its unit; 0 where it promises nothing.
+    """
+
+    moves: tuple[AxisMove, ...]
+    seconds: float
+    accuracy: Mapping[str, float]
+    notes: tuple[str, ...]
+
+
+def run_moves(
+    file: Path,
+    machine: Machine,
+    setup: Setup | None = None,
+    *,
+    mode: str = SIMULATION,
+    channel: str | None = None,
+    interface: str = BUILTIN,
+    bitrate: int = BITRATE,
+    tuning: Mapping[str, float | str] | None = None,
+    progress: Progress | None = None,
+    carried: Progress | None = None,
+) -> MovesRun:
+    """Carry the program in `file` out by the modules of `machine`, in a mode of `MODES`.
+
+    `tuning` (fields of `rds.bus.modules.oacs.pid.Tuning`) is of modules that the run starts itself; those that are
+    served on `channel` keep theirs. `progress` hears how many lines are read, `carried` how many moves are carried out.
+    InputError for a mode or a program that move commands cannot carry out; MachineError if a module or the bus fails.
+    """
+    if mode not in MODES:
+        raise InputError(f"method {METHOD} runs in {' and '.join(MODES)}: a move command has no dry run; not in {mode}")
+    blocks = list(compiled_form(file, machine, setup or Setup(), progress).blocks())
+    rows = [row for block in blocks for row in block.segments]
+    _require_points(rows, file)
+    modules = read_modules(machine)
+    chosen = _tuning(tuning or {})
+    with ExitStack() as stack:
+        if mode == SIMULATION:
+            if channel is not None:
+                raise InputError("a simulation has modules of its own; leave the channel out")
+            virtual = _virtual(machine, modules)
+            port: Port = VirtualPort(list(virtual.values()))
+            gauges = {name: module.plant for name, module in virtual.items()}
+        else:
+            port, gauges = _bus(machine, channel, interface, bitrate, stack), {}
+        host = Several(port, {data.node: f"{name} (module {data.node})" for name, data in modules.items()})
+        if chosen is not None:
+            if mode != SIMULATION and not _starts_modules(channel, interface):
+                raise InputError(
+                    f"{', '.join(chosen[1]) or 'controller'}: modules that are served already keep their tuning; set "
+                    "it by `rds module ID tune`"
+                )
+            for data in modules.values():
+                if data.kind != Kind.TOOL:
+                    host.tune(data.node, *chosen)
+        done = _Carrier(host, machine, modules, gauges, file)
+        began = port.now()
+        try:
+            number = 0
+            for row, events in _in_order(blocks):
+                done.carry_out(row, events)
+                number += row is not None
+                if carried is not None:
+                    carried(number, len(rows))
+        finally:
+            host.stop()
+        seconds = port.now() - began
+    notes = ["F and rapids are not told apart: each module moves at the speed of its own controller."]
+    if left := sorted({_NOT_CARRIED[e.kind] for block in blocks for e in block.events if e.kind in _NOT_CARRIED}):
+        notes.append(f"Modules move axes and a tool only; not carried out of the program: {', '.join(left)}.")
+    accuracy = {name: modules[name].accuracy for name in dict.fromkeys(move.axis for move in done.moves)}
+    return MovesRun(tuple(done.moves), seconds, accuracy, tuple(notes))
+
+
+class _Carrier:
+    """Carries lines out, one after the other, and keeps what came of them."""
+
+    def __init__(
+        self, host: Several, machine: Machine, modules: Mapping[str, ModuleData], gauges: Mapping[str, Any], file: Path
+    ):
+        self._host, self._modules, self._gauges, self._file = host, modules, gauges, file
+        self._axes = {AXES.index(name): name for name in machine.axes if name in AXES}
+        self._tool = next((data.node for data in modules.values() if data.kind == Kind.TOOL), None)
+        self._at_start: set[int] = set()
+        self.moves: list[AxisMove] = []
+
+    def carry_out(self, row: np.void | None, events: Sequence[Event]) -> None:
+        """The motion of a segment, if there is one, then what happens after it."""
+        if row is not None:
+            self._begin(row)
+            self._move(row)
+        for event in events:
+            if event.kind == "dwell":
+                self._host.rest(float(event.value))
+            elif event.kind == "spindle" and self._tool is not None:
+                self._host.turn(self._tool, float(event.value))
+
+    def _begin(self, row: np.void) -> None:
+        """An axis that the program moves for the first time goes to where it takes it from, if it stands elsewhere."""
+        away = {}
+        for k in np.flatnonzero(row["start"] != row["end"]):
+            data = self._modules[self._axes[int(k)]]
+            if data.node in self._at_start:
+                continue
+            self._at_start.add(data.node)
+            here = self._host.position(data.node) / data.counts_per_unit
+            if abs(here - row["start"][k]) > max(data.accuracy, 1.0 / data.counts_per_unit):
+                away[data.node] = float(row["start"][k]), data, abs(here - row["start"][k])
+        if away:
+            patience = max(_patience(data, way) for _, data, way in away.values())
+            self._host.to({node: target for node, (target, _, _) in away.items()}, patience)
+
+    def _move(self, row: np.void) -> None:
+        moved = {self._axes[int(k)]: int(k) for k in np.flatnonzero(row["start"] != row["end"])}
+        if not moved:
+            return
+        targets = {self._modules[name].node: float(row["end"][k]) for name, k in moved.items()}
+        ways = {name: abs(row["end"][k] - row["start"][k]) for name, k in moved.items()}
+        patience = max(_patience(self._modules[name], way) for name, way in ways.items())
+        arrived = self._host.to(targets, patience)
+        for name, k in moved.items():
+            data = self._modules[name]
+            end = arrived[data.node]
+            gauge = self._gauges[name].true_position if name in self._gauges else None
+            start, to = float(row["start"][k]), float(row["end"][k])
+            at = end.counts / data.counts_per_unit
+            self.moves.append(AxisMove(int(row["line"]), name, data.unit, start, to, at, gauge, end.seconds))
+
+
+def _in_order(blocks: Sequence[PathBlock]) -> Iterator[tuple[np.void | None, list[Event]]]:
+    """The segments of all blocks, each with the events after it; those before a block's first come with none."""
+    for block in blocks:
+        yield None, [event for event in block.events if event.after < 0]
+        for k, row in enumerate(block.segments):
+            yield row, [event for event in block.events if event.after == k]
+
+
+def _require_points(rows: Sequence[np.void], file: Path) -> None:
+    """InputError for a program that is more than points to go to."""
+    for row in rows:
+        if row["plane"] != LINE:
+            raise InputError(
+                f"line {row['line']} is an arc, and a move command takes an axis to a point: leave --method out, which "
+                "commands the modules cyclically, or write the arc as straight moves",
+                str(file),
+            )
+        if row["tip"] != JOINTS:
+            raise InputError(
+                f"line {row['line']} is a move for the tool's tip (G43.4), and a move command takes one axis to a "
+                "point: leave --method out",
+                str(file),
+            )
+    if not any((row["start"] != row["end"]).any() for row in rows):
+        raise InputError("nothing in it moves: there is nothing to run", str(file))
+
+
+def _virtual(machine: Machine, modules: Mapping[str, ModuleData]) -> dict[str, OacsModule]:
+    return {
+        axis.name: OacsModule(axis, modules[axis.name], slot, machine.sample_period, 0.0, slot, machine.converter.range)
+        for slot, axis in enumerate(machine.axes.values())
+    }
+
+
+def _starts_modules(channel: str | None, interface: str) -> bool:
+    """Whether modules are started for the run, where nobody says which bus they are on."""
+    return channel is None and interface == BUILTIN
+
+
+def _bus(machine: Machine, channel: str | None, interface: str, bitrate: int, stack: ExitStack) -> BusPort:
+    """A bus with the modules on it; they are started for this run where no channel and no other bus is said."""
+    from rds.bus.modules.server_process import end_server, start_server
+
+    if _starts_modules(channel, interface):
+        channel = f"{machine.name[:20]}-{secrets.token_hex(4)}"
+        stack.callback(end_server, start_server("oacs", machine.path, channel))
+    bus = open_bus(interface, channel, None, node="host", **({} if interface == BUILTIN else {"bitrate": bitrate}))
+    stack.callback(bus.shutdown)
+    return BusPort(bus)
+
+
+def _tuning(words: Mapping[str, float | str]) -> tuple[Select, dict[str, float]] | None:
+    """Controller and parameters; None where nothing is said. InputError for those that cannot be."""
+    if not words:
+        return None
+    known = [field.name for field in fields(Tuning)]
+    if unknown := [name for name in words if name not in known]:
+        raise InputError(
+            f"--option {unknown[0]} is none of method {METHOD}; it takes channel words interface and bitrate, and of "
+            f"the modules' controllers {', '.join(known)}"
+        )
+    values = dict(words)
+    name = str(values.pop("controller", "PID")).upper()
+    if name not in Select.__members__:
+        raise InputError(f"controller = {name!r} must be PI or PID")
+    Tuning(controller=Select[name], **values)  # type: ignore[arg-type]
+    return Select[name], {key: float(value) for key, value in values.items()}
+
+
+def _patience(data: ModuleData, way: float) -> float:
+    """s that a motion may take."""
+    slowest = min(data.clockwise_speed, data.counterclockwise_speed) / 60.0
+    return _SLACK + 2.0 * float(way) / max(slowest, _SLOWEST)
+
+
+def moves_report(run: MovesRun, file: Path, settings: Mapping[str, Any]) -> Report:
+    """The run as a table, and what it comes to as sentences."""
+    table = Table("Moves", COLUMNS, [_row(move) for move in run.moves], _NOTE)
+    lines = len({move.line for move in run.moves})
+    said = [f"{lines} line{'s' * (lines != 1)} with motion in {run.seconds:.1f} s."]
+    for name, promised in run.accuracy.items():
+        own = [move for move in run.moves if move.axis == name]
+        worst = max(own, key=lambda move: abs(_true(move) - move.end))
+        off = abs(_true(worst) - worst.end)
+        verdict = "" if not promised else f", {'within' if off <= promised else 'beyond'} its {promised:g} {worst.unit}"
+        said.append(f"{name} ends {off:.3g} {worst.unit} off at most, in line {worst.line}{verdict}.")
+    return Report(
+        kind="module-moves",
+        title=f"{file.name} by move commands",
+        sources=[str(file)],
+        settings=settings,
+        tables=[table],
+        figures={},
+        findings=[*said, *run.notes],
+    )
+
+
+def _true(move: AxisMove) -> float:
+    return move.arrived if move.gauge is None else move.gauge
+
+
+def _row(move: AxisMove) -> list[Any]:
+    gauge = (None, None) if move.gauge is None else (move.gauge, move.gauge - move.end)
+    return [move.line, move.axis, move.unit, move.start, move.end, move.arrived, move.off, *gauge, move.seconds]
