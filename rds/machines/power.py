@@ -7,6 +7,7 @@ motors may start at once. Source of the shipped machine's numbers: oacs-thesis, 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import floor
 from typing import Any
@@ -98,7 +99,7 @@ def power_budget(machine: Machine) -> PowerBudget:
     modules, unknown = [], []
     for axis in machine.axes.values():
         own = axis.module
-        start, run = own.get("current_start", 0.0), own.get("current_run", 0.0)
+        start, run = (_larger(own, name) for name in ("current_start", "current_run"))
         if not start and not run and not own.get("current_peak"):
             unknown.append(axis.name)
             continue
@@ -108,3 +109,8 @@ def power_budget(machine: Machine) -> PowerBudget:
             "none of its modules says a current; add current_start and current_run to [axis.NAME.module]", machine.path
         )
     return PowerBudget(machine.name, machine.power.voltage, machine.power.current, tuple(modules), tuple(unknown))
+
+
+def _larger(module: Mapping[str, Any], name: str) -> float:
+    """The larger of both ways round, A."""
+    return max(float(module.get(name, 0.0)), float(module.get(f"counterclockwise_{name}", 0.0)))

@@ -417,3 +417,41 @@ def test_hostile_frames_break_nothing(frames_: list[tuple[int, bytes, float]]) -
     assert rig.module.plant.voltage == 0.0
     kinds: list[Any] = [m.fields for m in rig.said("Reply") if m.fields.get("Acknowledges") == Acknowledges.EMERGENCY]
     assert kinds
+
+
+@pytest.mark.parametrize(
+    ("name", "direction", "mean", "std", "swings"),
+    [
+        # tables Q39 to Q41: mean and standard deviation of the readings behind the first
+        ("X", 1, 2.477, 0.357, True),
+        ("X", 0, 2.735, 0.292, True),
+        ("Z", 1, 4.030, 0.568, True),
+        ("Z", 0, 3.677, 0.606, True),
+        ("A", 1, 1.794, 0.061, False),
+        ("A", 0, 1.876, 0.146, False),
+    ],
+)
+def test_currents_are_the_tables_and_swing_with_the_screw(
+    bench: Benches, name: str, direction: int, mean: float, std: float, swings: bool
+) -> None:
+    """Figures 94 and 95: as many crests as turns of the M24x3 screw."""
+    rig = bench(name)
+    rig.say("Command", Code=Code.READINGS, Quantities=words.Quantity.CURRENT, ReadingsPeriod=50)
+    way = 12.0 if swings else 30.0  # mm, four turns; degrees
+    rig.move(Move.START, Direction=direction, Argument=round(way * 1000))
+    while rig.module.mover.mode != Mode.MOVING:
+        rig.run(0.01)
+    rig.run(0.5)
+    began = len(rig.said("Current"))
+    while rig.module.mover.mode == Mode.MOVING:
+        rig.run(0.05)
+    running = [m.fields["Current"] for m in rig.said("Current")][began:-25]  # before it comes to its end
+    average = sum(running) / len(running)
+    assert average == pytest.approx(mean, rel=0.05)
+    spread = (sum((each - average) ** 2 for each in running) / len(running)) ** 0.5
+    if not swings:
+        assert spread < 0.15
+        return
+    assert spread == pytest.approx(std, rel=0.25)
+    crossings = sum((a - average) * (b - average) < 0.0 for a, b in pairwise(running))
+    assert 2 * (way / 3.0) - 3 <= crossings <= 2 * (way / 3.0) + 1

@@ -60,6 +60,10 @@ class ModuleData:
     debounce: float = 0.1  # oacs-thesis 6.10
     current_start: float = 0.0  # A, at the supply and at rest
     current_run: float = 0.0  # A, at the supply and full speed
+    counterclockwise_current_start: float | None = None  # A; None: as clockwise
+    counterclockwise_current_run: float | None = None
+    current_swing: float = 0.0  # A about the mean at full speed, once in each turn of the screw
+    lead: float = 0.0  # way in a turn of the screw
     current_peak: float = 0.0  # A, the largest
     accelerometer: tuple[int, int, int] | None = None  # readings at rest; None: it has none
     vibration: tuple[int, int, int] = (0, 0, 0)  # amplitude of the readings at full speed
@@ -74,6 +78,13 @@ class ModuleData:
     def unit(self) -> str:
         """Unit of positions and lengths."""
         return UNITS[self.kind]
+
+    def currents(self, clockwise: bool) -> tuple[float, float]:
+        """A, at the supply that way round: at rest, and at full speed."""
+        start, run = self.counterclockwise_current_start, self.counterclockwise_current_run
+        if clockwise:
+            return self.current_start, self.current_run
+        return self.current_start if start is None else start, self.current_run if run is None else run
 
     def describe(self, serial: int, slot: int = 0) -> ModuleDescription:
         """What a download of this module carries; `slot` is the place of its voltage in cyclic commands, from 1."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rds.bus.modules.oacs import messages
 from rds.bus.modules.oacs.codes import SLOT_GRID, MessageToHost, Quantity
-from rds.bus.modules.oacs.sensors import gravities, motor_current, vibrating
+from rds.bus.modules.oacs.sensors import gravities, motor_current, swing, vibrating
 
 if TYPE_CHECKING:
     from rds.bus.modules.oacs.messages import Frame
@@ -96,7 +96,12 @@ class Readings:
     def _current(self) -> Frame:
         data, plant = self._module.data, self._module.plant
         # the speed at the full supply, which friction keeps below the motor's own
-        full = data.clockwise_speed if plant.velocity > 0 else data.counterclockwise_speed
+        clockwise = plant.voltage > 0.0 or (plant.voltage == 0.0 and plant.velocity > 0.0)
+        full = data.clockwise_speed if clockwise else data.counterclockwise_speed
+        start, run = data.currents(clockwise)
         speed = plant.velocity if plant.tool else plant.velocity * 60.0
-        current = motor_current(plant.voltage, speed, data.current_start, data.current_run, data.supply, full)
+        current = motor_current(plant.voltage, speed, start, run, data.supply, full)
+        if data.current_swing and data.lead and full:
+            current += swing(data.current_swing, abs(speed) / full, plant.true_position, data.lead)
+        current = max(current, 0.0)
         return messages.encode("Current", self._module.node, Current=min(current, 32.0), CurrentCount=self._samples)

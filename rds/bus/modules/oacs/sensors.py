@@ -48,3 +48,12 @@ def motor_current(voltage: float, speed: float, start: float, run: float, supply
         return 0.0
     current = start * voltage / supply - (start - run) * speed / full_speed
     return abs(current)
+
+
+def swing(amplitude: float, share: float, position: float, lead: float) -> float:
+    """What a screw that runs unevenly adds to the current, A: `amplitude` at full speed, once in each turn.
+
+    `share` (0 to 1) is of the full speed, `position` and `lead` are in one unit. The currents of figures 94 and 95 have
+    such a trend, by a power screw that is harder to turn in one part of its turn than in the other (10.1.4).
+    """
+    return amplitude * min(share, 1.0) * sin(2 * pi * position / lead)
