@@ -51,7 +51,7 @@ def test_the_program_of_the_thesis_by_its_controllers(tmp_path: Path) -> None:
     report = moves_report(run, tmp_path / "part.ngc", {})
     said = " ".join(report.findings)
     assert "within its 1 mm" in said and "A ends 1." in said
-    assert "F and rapids are not told apart" in said and "M0 and M1" in said
+    assert "F is not obeyed" in said and "M0 and M1" in said
 
 
 def test_lines_come_one_after_the_other_and_a_virtual_run_repeats(tmp_path: Path) -> None:

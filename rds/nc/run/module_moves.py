@@ -38,6 +38,7 @@ MODES = tuple(name for name in mode_names("controller") if name != EMULATION)
 MACHINE = "mrmt-oacs"
 BITRATE = 500_000  # bit/s, of a real bus: appendix H
 COLUMNS = ("line", "axis", "unit", "from", "to", "arrived", "off", "gauge", "gauge off", "time [s]")
+_DIGITS = dict.fromkeys(("arrived", "off", "gauge", "gauge off"), 3) | {"time [s]": 2}
 _SLACK = 10.0  # s that a motion may take beyond twice its way at the slowest speed
 _SLOWEST = 0.1  # unit/s, where a module says no speed
 _NOTE = (
@@ -136,7 +137,7 @@ def run_moves(
         finally:
             host.stop()
         seconds = port.now() - began
-    notes = ["F and rapids are not told apart: each module moves at the speed of its own controller."]
+    notes = ["F is not obeyed: each module moves at the speed of its own controller."]
     if left := sorted({_NOT_CARRIED[e.kind] for block in blocks for e in block.events if e.kind in _NOT_CARRIED}):
         notes.append(f"Modules move axes and a tool only; not carried out of the program: {', '.join(left)}.")
     accuracy = {name: modules[name].accuracy for name in dict.fromkeys(move.axis for move in done.moves)}
@@ -256,8 +257,8 @@ def _tuning(words: Mapping[str, float | str]) -> tuple[Select, dict[str, float]]
     known = [field.name for field in fields(Tuning)]
     if unknown := [name for name in words if name not in known]:
         raise InputError(
-            f"--option {unknown[0]} is none of method {METHOD}; it takes channel words interface and bitrate, and of "
-            f"the modules' controllers {', '.join(known)}"
+            f"--option {unknown[0]} is none of method {METHOD}; it takes interface and bitrate of the bus, and "
+            f"of the modules' controllers {', '.join(known)}"
         )
     values = dict(words)
     name = str(values.pop("controller", "PID")).upper()
@@ -275,7 +276,7 @@ def _patience(data: ModuleData, way: float) -> float:
 
 def moves_report(run: MovesRun, file: Path, settings: Mapping[str, Any]) -> Report:
     """The run as a table, and what it comes to as sentences."""
-    table = Table("Moves", COLUMNS, [_row(move) for move in run.moves], _NOTE)
+    table = Table("Moves", COLUMNS, [_row(move) for move in run.moves], _NOTE, _DIGITS)
     lines = len({move.line for move in run.moves})
     said = [f"{lines} line{'s' * (lines != 1)} with motion in {run.seconds:.1f} s."]
     for name, promised in run.accuracy.items():
