@@ -2,7 +2,8 @@
 
 The currents stand in the `[axis.NAME.module]` tables, the supply in `[power]`. Each motor draws `current_start` at
 rest, `current_run` at speed and at most `current_peak`; where no largest current is known, it is that of the start. Of
-both ways round the larger counts. All motors may start at once. Source of the shipped machine's numbers: oacs-thesis, 10.1.3 and tables Q39 to Q43.
+both ways round the larger counts. All motors may start at once. Source of the shipped machine's numbers: oacs-thesis,
+10.1.3 and tables Q39 to Q43.
 """
 
 from __future__ import annotations
