@@ -136,6 +136,17 @@ def test_moves_from_a_bus_log(tmp_path: Path) -> None:
     assert parse_pairs(OACS_MOVES)[0].name == "cw"
 
 
+def test_moves_to_a_point_are_moves() -> None:
+    """As a part program by move commands makes them: accepted, then carried out, without a direction."""
+    frames = [
+        *(frame(1.0, 4, "0303000010270000"), frame(1.007, 0, "0404045801000000"), frame(6.5, 0, "04040458009a0600")),
+        *(frame(7.0, 4, "0303000000000000"), frame(7.003, 0, "0404045802000000")),  # outside its travel
+    ]
+    assert exchanges(frames, OACS, 10.0).times["move to a point", 4] == pytest.approx([0.007, 0.003])
+    moved = exchanges(frames, parse_pairs(OACS_MOVES), 600.0)
+    assert moved.times == {("to a point", 4): pytest.approx([5.5])} and moved.unanswered("to a point", 4) == 1
+
+
 def test_patterns() -> None:
     assert parse_pattern("001#01").module(frame(0, 1, "0100")) == 0
     assert parse_pattern("001#01").module(frame(0, 1, "02")) is None

@@ -15,7 +15,8 @@ from rds.results.reports.pairing import Pair, parse_pairs
 DIALECTS = {
     "oacs": (
         "general call: 001#01 -> 000#01MM; type call: 001#02 -> 000#02MM; data download: M#02 -> 000#02MM | 120+M#10; "
-        "move start: M#0301 -> 000#04MM00 then 000#04MM00....; move stop: M#0300 -> 000#04MM03"
+        "move start: M#0301 -> 000#04MM00 then 000#04MM00....; move stop: M#0300 -> 000#04MM03; "
+        "move to a point: M#0303 -> 000#04MM04 then 000#04MM04...."
     ),
     "rds": "cycle: 010# -> 020+M#..........00; dry run: 011# -> 020+M#..........00; call: 013# -> 020+M#..........01",
     "sdo": "service data: 600+M# -> 580+M#",
@@ -23,8 +24,11 @@ DIALECTS = {
 
 # A start is acknowledged when the move has been carried out; the request's fourth byte is its direction (table 6). Our
 # modules say at once that they have accepted it (fifth byte 1), and at the end that it is carried out (0).
+# A command to a point (ours) has no direction, and numbers of its own.
 _CARRIED_OUT = "000#04MM00..00 | 000#04MM00..$"
-OACS_MOVES = f"cw: M#0301..01 -> {_CARRIED_OUT}; ccw: M#0301..00 -> {_CARRIED_OUT}"
+OACS_MOVES = (
+    f"cw: M#0301..01 -> {_CARRIED_OUT}; ccw: M#0301..00 -> {_CARRIED_OUT}; to a point: M#0303 -> 000#04MM04..00"
+)
 
 
 def pairs_from(dialect: str, pairs: str | None) -> list[Pair]:
