@@ -63,6 +63,9 @@ def test_lines_come_one_after_the_other_and_a_virtual_run_repeats(tmp_path: Path
     ]
     assert run.seconds == pytest.approx(sum(move.seconds for move in run.moves) + 1.0, abs=0.8), "and the dwell"
     assert carried_out(tmp_path, HOLE) == run
+    told = dict(run.positions["X"])
+    assert list(told.values()) == sorted(told.values()) and max(told.values()) == pytest.approx(2.0, abs=0.3)
+    assert max(told) < min(at for at, place in run.positions["Z"] if place < -0.05), "Z goes when X has arrived"
 
 
 def test_a_controller_that_brakes_ends_on_the_point(tmp_path: Path) -> None:
@@ -154,6 +157,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [dict(zip(table["columns"], row, strict=True)) for row in table["rows"]]
     assert [(row["line"], row["axis"], row["to"]) for row in rows] == [(3, "X", 2), (4, "Z", -1), (6, "Z", 0)]
     assert all(row["time [s]"] > 0.2 for row in rows)
+    assert Path("moved/module-moves-positions.png").stat().st_size > 5000
     assert Path("moved/module-moves.html").is_file() and Path("moved/module-moves-moves.csv").is_file()
     refused = CliRunner().invoke(app, [*words, "--motion", "plan", "--baud", "9600"])
     assert refused.exit_code == 2 and "--motion, --baud is of methods A, B and C" in refused.stderr

@@ -12,13 +12,14 @@ from __future__ import annotations
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rds.bus.modules.oacs.codes import Kind, Select
+from rds.bus.modules.oacs.codes import Kind, MessageToHost, Select
+from rds.bus.modules.oacs.messages import Decoded
 from rds.bus.modules.oacs.module import OacsModule
 from rds.bus.modules.oacs.module_data import ModuleData, read_modules
 from rds.bus.modules.oacs.pid import Tuning
@@ -32,6 +33,9 @@ from rds.nc.path_block import Event, PathBlock
 from rds.nc.run.prepare import Progress, compiled_form
 from rds.nc.setup import Setup
 from rds.results.reports.content import Report, Table
+
+if TYPE_CHECKING:
+    from rds.core.figure import Picture
 
 METHOD = "moves"
 MODES = tuple(name for name in mode_names("controller") if name != EMULATION)
@@ -71,13 +75,15 @@ class AxisMove:
 class MovesRun:
     """A program carried out by move commands: each axis of each line, the time that it took, s, and what was left out.
 
-    `accuracy` is what the module of each axis promises, in its unit; 0 where it promises nothing.
+    `accuracy` is what the module of each axis promises, in its unit; 0 where it promises nothing. `positions` are what
+    the modules told on their way, by axis: s since the beginning, and axis units.
     """
 
     moves: tuple[AxisMove, ...]
     seconds: float
     accuracy: Mapping[str, float]
     notes: tuple[str, ...]
+    positions: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
 
 
 def run_moves(
@@ -125,8 +131,7 @@ def run_moves(
             for data in modules.values():
                 if data.kind != Kind.TOOL:
                     host.tune(data.node, *chosen)
-        done = _Carrier(host, machine, modules, gauges, file)
-        began = port.now()
+        done, began = _Carrier(host, machine, modules, gauges), port.now()
         try:
             number = 0
             for row, events in _in_order(blocks):
@@ -141,16 +146,19 @@ def run_moves(
     if left := sorted({_NOT_CARRIED[e.kind] for block in blocks for e in block.events if e.kind in _NOT_CARRIED}):
         notes.append(f"Modules move axes and a tool only; not carried out of the program: {', '.join(left)}.")
     accuracy = {name: modules[name].accuracy for name in dict.fromkeys(move.axis for move in done.moves)}
-    return MovesRun(tuple(done.moves), seconds, accuracy, tuple(notes))
+    told = {name: tuple(places) for name, places in done.told.items()}
+    return MovesRun(tuple(done.moves), seconds, accuracy, tuple(notes), told)
 
 
 class _Carrier:
     """Carries lines out, one after the other, and keeps what came of them."""
 
-    def __init__(
-        self, host: Several, machine: Machine, modules: Mapping[str, ModuleData], gauges: Mapping[str, Any], file: Path
-    ):
-        self._host, self._modules, self._gauges, self._file = host, modules, gauges, file
+    def __init__(self, host: Several, machine: Machine, modules: Mapping[str, ModuleData], gauges: Mapping[str, Any]):
+        self._host, self._modules, self._gauges = host, modules, gauges
+        self._by_number = {data.node: data for data in modules.values() if data.kind != Kind.TOOL}
+        self._began = host.port.now()
+        self.told: dict[str, list[tuple[float, float]]] = {}
+        host.listen = self._listen
         self._axes = {AXES.index(name): name for name in machine.axes if name in AXES}
         self._tool = next((data.node for data in modules.values() if data.kind == Kind.TOOL), None)
         self._at_start: set[int] = set()
@@ -166,6 +174,15 @@ class _Carrier:
                 self._host.rest(float(event.value))
             elif event.kind == "spindle" and self._tool is not None:
                 self._host.turn(self._tool, float(event.value))
+
+    def _listen(self, at: float, message: Decoded) -> None:
+        """Keep the positions that modules tell on their way."""
+        fields = message.fields
+        if message.kind == "Reply" and fields["Code"] == MessageToHost.POSITION:
+            data = self._by_number.get(fields["BoardID"])
+            if data is not None:
+                place = fields["Position"] / data.counts_per_unit
+                self.told.setdefault(data.name, []).append((at - self._began, place))
 
     def _begin(self, row: np.void) -> None:
         """An axis that the program moves for the first time goes to where it takes it from, if it stands elsewhere."""
@@ -291,9 +308,29 @@ def moves_report(run: MovesRun, file: Path, settings: Mapping[str, Any]) -> Repo
         sources=[str(file)],
         settings=settings,
         tables=[table],
-        figures={},
+        figures={"Positions": lambda: _picture(run)} if run.positions else {},
         findings=[*said, *run.notes],
     )
+
+
+def _picture(run: MovesRun) -> Picture:
+    """Each axis over time as its module told it, and the points that it was sent to."""
+    from rds.core.figure import BLACK, CYCLE, Picture, dress, legend, quantity
+
+    names = [name for name in run.accuracy if run.positions.get(name)]
+    picture = Picture(0.8 + 1.5 * len(names))
+    for k, (axes, name) in enumerate(
+        zip(np.atleast_1d(picture.subplots(len(names), 1, sharex=True)), names, strict=True)
+    ):
+        time, place = np.array(run.positions[name]).T
+        axes.plot(time, place, color=CYCLE[k % len(CYCLE)], label=f"{name}, by its module")
+        own = [move for move in run.moves if move.axis == name]
+        for number, move in enumerate(own):
+            label = "points of the program" if not number else None
+            axes.axhline(move.end, color=BLACK, linewidth=0.7, linestyle=":", label=label)
+        dress(axes, quantity(name, own[0].unit), "time [s]" if name == names[-1] else None)
+        legend(axes)
+    return picture
 
 
 def _true(move: AxisMove) -> float:

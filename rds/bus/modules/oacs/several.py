@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple, NoReturn, Protocol
 
@@ -100,6 +100,7 @@ class Several:
 
     def __init__(self, port: Port, names: Mapping[int, str]):
         self.port, self._names = port, dict(names)
+        self.listen: Callable[[float, Decoded], None] = lambda at, message: None  # everything they say, and when, s
         self._turning: set[int] = set()  # tools
         self._alive = port.now() + _KEEP_ALIVE
 
@@ -204,6 +205,7 @@ class Several:
                     self._send(number, Code=Code.READ_PARAMETER, ReadIndex=Parameter.SELECT)
             message = self.port.hear(min(until, self._alive))
             if message is not None:
+                self.listen(self.port.now(), message)
                 ended = self._turning and acknowledgement(Acknowledges.START, last=True)(message)
                 if ended and (number := message.fields["BoardID"]) in self._turning:
                     self._turning.discard(number)
