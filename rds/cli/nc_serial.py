@@ -192,6 +192,7 @@ def _run_moves(
             tuning=words,
             progress=bar("check"),
             carried=bar("moves"),
+            tell=lambda note: typer.echo(f"rds: note: {note}", err=True),
             **bus,
         )
     report = moves_report(run, file, {"machine": where, "mode": how, **words})

@@ -39,7 +39,8 @@ def carried_out(folder: Path, text: str, **options: Any) -> MovesRun:
 def test_the_program_of_the_thesis_by_its_controllers(tmp_path: Path) -> None:
     """Speeds of tables 18 and O35; X within its 1 mm (table 14), A too far by counts that its board loses (9.5)."""
     setup = Setup(options=Dialect(program_numbers=True, default_feed=True))
-    run = carried_out(tmp_path, P001, setup=setup)
+    told: list[str] = []
+    run = carried_out(tmp_path, P001, setup=setup, tell=told.append)
     x, a = run.moves
     assert (x.line, x.axis, x.end, a.line, a.axis, a.end) == (3, "X", 100.0, 3, "A", 25.0)
     assert x.seconds == pytest.approx(100.0 / 130.0 * 60.0, abs=1.0)
@@ -48,6 +49,7 @@ def test_the_program_of_the_thesis_by_its_controllers(tmp_path: Path) -> None:
     assert x.gauge is not None and 0.0 < x.gauge - 100.0 < 1.0 and x.arrived == pytest.approx(x.gauge, abs=0.01)
     assert a.gauge is not None and abs(a.off) < 0.2, "by its own counts it is there..."
     assert a.gauge - a.arrived == pytest.approx(25.0 * 4 / 63, abs=0.6), "... of which it has lost four of 67"
+    assert told == list(run.notes) and len(told) == 2, "before it moves"
     report = moves_report(run, tmp_path / "part.ngc", {})
     said = " ".join(report.findings)
     assert "within its 1 mm" in said and "A ends 1." in said

@@ -10,7 +10,7 @@ In a simulation the modules are virtual and time is that of their bus; a dial ga
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -98,11 +98,13 @@ def run_moves(
     tuning: Mapping[str, float | str] | None = None,
     progress: Progress | None = None,
     carried: Progress | None = None,
+    tell: Callable[[str], None] = lambda note: None,
 ) -> MovesRun:
     """Carry the program in `file` out by the modules of `machine`, in a mode of `MODES`.
 
     `tuning` (fields of `rds.bus.modules.oacs.pid.Tuning`) is of modules that the run starts itself; those that are
-    served on `channel` keep theirs. `progress` hears how many lines are read, `carried` how many moves are carried out.
+    served on `channel` keep theirs. `progress` hears how many lines are read, `carried` how many moves are carried out, and
+    `tell`, before anything moves, what of the program is not.
     InputError for a mode or a program that move commands cannot carry out; MachineError if a module or the bus fails.
     """
     if mode not in MODES:
@@ -112,6 +114,11 @@ def run_moves(
     _require_points(rows, file)
     modules = read_modules(machine)
     chosen = _tuning(tuning or {})
+    notes = ["F is not obeyed: each module moves at the speed of its own controller."]
+    if left := sorted({_NOT_CARRIED[e.kind] for block in blocks for e in block.events if e.kind in _NOT_CARRIED}):
+        notes.append(f"Modules move axes and a tool only; not carried out of the program: {', '.join(left)}.")
+    for note in notes:
+        tell(note)
     with ExitStack() as stack:
         if mode == SIMULATION:
             if channel is not None:
@@ -142,9 +149,6 @@ def run_moves(
         finally:
             host.stop()
         seconds = port.now() - began
-    notes = ["F is not obeyed: each module moves at the speed of its own controller."]
-    if left := sorted({_NOT_CARRIED[e.kind] for block in blocks for e in block.events if e.kind in _NOT_CARRIED}):
-        notes.append(f"Modules move axes and a tool only; not carried out of the program: {', '.join(left)}.")
     accuracy = {name: modules[name].accuracy for name in dict.fromkeys(move.axis for move in done.moves)}
     told = {name: tuple(places) for name, places in done.told.items()}
     return MovesRun(tuple(done.moves), seconds, accuracy, tuple(notes), told)
