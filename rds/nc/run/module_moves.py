@@ -103,8 +103,8 @@ def run_moves(
     """Carry the program in `file` out by the modules of `machine`, in a mode of `MODES`.
 
     `tuning` (fields of `rds.bus.modules.oacs.pid.Tuning`) is of modules that the run starts itself; those that are
-    served on `channel` keep theirs. `progress` hears how many lines are read, `carried` how many moves are carried out, and
-    `tell`, before anything moves, what of the program is not.
+    served on `channel` keep theirs. `progress` hears how many lines are read, `carried` how many moves are carried out,
+    and `tell`, before anything moves, what of the program is not.
     InputError for a mode or a program that move commands cannot carry out; MachineError if a module or the bus fails.
     """
     if mode not in MODES:
