@@ -105,7 +105,22 @@ for kind, use in json.loads(sys.stdin.read()).items():
     except BaseException:
         answer = traceback.format_exc()
     print("answer", json.dumps([kind, answer]), flush=True)
+from typer.testing import CliRunner
+from rds.cli.main import app
+for kind, words in json.loads(sys.argv[2]).items():
+    said = CliRunner().invoke(app, words, env={"COLUMNS": "400", "NO_COLOR": "1"}).output
+    print("answer", json.dumps(["--help " + kind, said]), flush=True)
 """
+LISTED = {  # what lists the parts of each kind
+    "": ["library", "--markdown"],
+    "interpolator": ["interpolate", "--help"],
+    "acceleration filter": ["interpolate", "--help"],
+    "mode": ["run", "--help"],
+    "dialect": ["machine", "serve", "--help"],
+    "format of bus logs": ["bus", "record", "--help"],
+    "report": ["report", "--help"],
+    "gradebook": ["grade", "export", "--help"],
+}
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +132,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
         add(part, checkout)
     batch_in(work / "batch", [grade()])
     done = subprocess.run(
-        [sys.executable, "-c", USE_ALL, str(checkout)],
+        [sys.executable, "-c", USE_ALL, str(checkout), json.dumps(LISTED)],
         input=json.dumps({kind: part.use for kind, part in PARTS.items()}),
         cwd=work,
         env=os.environ | {"PYTHONPATH": str(checkout)},
@@ -131,3 +146,15 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 @pytest.mark.parametrize("kind", PARTS)
 def test_a_part_that_was_added_works(kind: str, answers: dict[str, str]) -> None:
     assert answers[kind] == PARTS[kind].expected
+
+
+@pytest.mark.parametrize("kind", [kind for kind in PARTS if kind != "command"])
+def test_a_part_that_was_added_is_in_the_document_of_the_library_without_another_edit(
+    kind: str, answers: dict[str, str]
+) -> None:
+    assert PARTS[kind].name in answers["--help "]
+
+
+@pytest.mark.parametrize("kind", [kind for kind in LISTED if kind])
+def test_a_part_that_was_added_is_named_by_its_command_s_help(kind: str, answers: dict[str, str]) -> None:
+    assert PARTS[kind].name in answers[f"--help {kind}"]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rds.controllers import controller_module, controller_names
+from rds.controllers import controller_module, controller_names, is_for_spindle
 from rds.controllers.tracking import OBSERVER_POLE, POLES
 from rds.core.quantities import Declaration, Quantity
 from rds.core.shared_quantities import SAMPLE_PERIOD
@@ -38,7 +38,6 @@ _CONTROLLERS = {
     "lqg": "LQG",
     "smith": "Smith predictor",
 }
-OF_POSITION = ("tracking", "feedforward", "zero-phase", "cascade", "lqg", "smith")  # not offered for a spindle
 MODELS = {"default": "Default", USER: "User-defined"}
 POLE, POLE_OFFSET, OBSERVER = f"{PREFIX}pole", f"{PREFIX}pole_imaginary", f"{PREFIX}observer_pole"
 _COMMENT = 40  # characters of a file's comment that stand beside a field
@@ -128,8 +127,8 @@ def _path_fields() -> Iterable[Field]:
 
 
 def controllers(axis: Axis) -> Choice:
-    """The controllers that an axis can have: a spindle has nothing to observe, and no position loop."""
-    fitting = [name for name in controller_names() if axis.unit != SPINDLE or name not in OF_POSITION]
+    """The controllers that an axis can have: a spindle has nothing to observe."""
+    fitting = [name for name in controller_names() if axis.unit != SPINDLE or is_for_spindle(name)]
     first = "tracking" if "tracking" in fitting else "pid"
     options = labels(fitting, _CONTROLLERS) | {USER: "User-defined"}
     return Choice("controller", "Controller", "the law that answers with a voltage", first, options)
