@@ -33,6 +33,18 @@ def test_a_law_of_the_wrong_sign_ends_at_once_at_zero_volts_and_its_samples_are_
     assert len(rds.open_result(tmp_path)) == len(result) < 300
 
 
+@pytest.mark.realtime
+@pytest.mark.parametrize("mode", ["emulation", "implementation"])
+def test_in_real_time_and_on_the_machine_it_ends_as_well(alone: Path, mode: str) -> None:
+    law = {"name": "p", "Pgain": 0.0}
+    experiment = rds.Experiment(following_error={"ferror": 1.0}, reference=SINE, controller=law, duration=2.0)
+    result = experiment.run(mode, out=alone / "run")
+    error = np.abs(result["X_reference"] - result["X_measured"])
+    assert result.meta["ending"] == "following error" and "axis X was 1.0" in result.meta["ending_reason"]
+    assert (error[:-1] <= 1.0).all() and error[-1] > 1.0
+    assert mode != "implementation" or len(result["X_simulated"]) == len(result)
+
+
 def test_less_is_allowed_when_the_reference_is_slower() -> None:
     """Under a P law the error follows the speed, and what is allowed follows it down to MIN_FERROR."""
     usual = run({"ferror": 100.0})

@@ -157,9 +157,9 @@ FORMATS: tuple[DataFormat, ...] = (  # the first that a file is of reads it
 
 
 def endings() -> tuple[str, ...]:
-    """The endings of the files that are read: tables first, then bus logs."""
-    every = dict.fromkeys(ending for each in FORMATS for ending in each.endings)
-    return (*(each for each in every if each not in _OF_FRAMES), *_OF_FRAMES)
+    """The endings of the files that are read: texts, other tables, bus logs."""
+    every = (ending for each in FORMATS for ending in each.endings if ending not in _OF_FRAMES)
+    return tuple(dict.fromkeys((*TEXTS, *every, *_OF_FRAMES)))
 
 
 def read_table(
