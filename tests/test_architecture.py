@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
@@ -53,6 +54,13 @@ def test_the_paths_that_it_names_exist() -> None:
     named = {name for name in IN_CODE.findall(PROSE) if re.match(r"(rds|tests)/", name) and "NAME" not in name}
     assert len(named) > 60
     assert not [name for name in named if not (ROOT / name).exists()]
+
+
+def test_own_code_beside_a_library_says_why_in_its_docstring() -> None:
+    for file, _, why in rows("Own code beside a library"):
+        (name,) = IN_CODE.findall(file)
+        said = ast.get_docstring(ast.parse((ROOT / name).read_text(encoding="utf-8"))) or ""
+        assert why in " ".join(said.split()), name
 
 
 def test_the_modes_are_those_of_its_table() -> None:
