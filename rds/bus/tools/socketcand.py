@@ -16,7 +16,7 @@ A client that does not read is disconnected when `BACKLOG` bytes wait for it; th
 element that is not understood is answered by an error or, in a `send`, left out with a line in the log, as socketcand
 does.
 
-Our own, because python-can's `socketcand` is a client; there is no server in Python.
+Our own, because python-can's `socketcand` is a client alone.
 """
 
 from __future__ import annotations
