@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from rds.core.quantities import Quantity, Table
 from rds.core.types import Ending
 
+LARGEST = Quantity("largest following error, at the axis's largest velocity", "axis unit", above=0.0)
 FOLLOWING_ERROR = Table(
     "ends the run where the axis is too far from its reference (LinuxCNC's FERROR, MIN_FERROR)",
     {
-        "ferror": Quantity("largest following error, at the axis's largest velocity", "axis unit", above=0.0),
+        "ferror": LARGEST,
         "min_ferror": Quantity("largest following error at rest; by default ferror", "axis unit", above=0.0),
     },
     needed=("ferror",),
