@@ -19,7 +19,7 @@ def run(following_error: dict[str, float], **words: Any) -> rds.Result:
 
 
 def test_a_law_of_the_wrong_sign_ends_at_once_at_zero_volts_and_its_samples_are_kept(tmp_path: Path) -> None:
-    def control(t, r, y, state, params):  # type: ignore[no-untyped-def]
+    def control(t, r, y, state, params):
         return -50.0 * (r.position - y), state
 
     result = rds.Experiment(following_error={"ferror": 1.0}, reference=SINE, controller=control, duration=2.0).run(
@@ -49,7 +49,7 @@ def test_less_is_allowed_when_the_reference_is_slower() -> None:
     """Under a P law the error follows the speed, and what is allowed follows it down to MIN_FERROR."""
     usual = run({"ferror": 100.0})
     error, speed = np.abs(usual["X_reference"] - usual["X_measured"]), np.abs(usual["X_reference_velocity"])
-    top = rds.load_machine("mini-cnc").axes["X"].limits.velocity  # type: ignore[union-attr]
+    top = rds.load_machine("mini-cnc").axes["X"].limits.velocity
     ferror = 1.01 * error.max()
     assert usual.meta["ending"] == "done"
     ramp = run({"ferror": ferror, "min_ferror": 0.2 * error.max()})
