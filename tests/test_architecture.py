@@ -126,6 +126,7 @@ LISTED = {  # what lists the parts of each kind
     "mode": ["run", "--help"],
     "dialect": ["machine", "serve", "--help"],
     "format of bus logs": ["bus", "record", "--help"],
+    "format of logged data": ["data", "describe", "--help"],
     "report": ["report", "--help"],
     "gradebook": ["grade", "export", "--help"],
 }
