@@ -15,7 +15,7 @@ DONE := $(VENV)/.installed
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test bench pictures lock clean
+.PHONY: help setup demo test bench pictures tables lock clean
 
 help: ## list what make can do
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -36,6 +36,10 @@ bench: $(DONE) ## measure speed and latency, beside other programs where they ar
 
 pictures: $(DONE) ## draw the documents' pictures afresh
 	$(BIN)/python tests/pictures.py
+
+tables: $(DONE) ## make docs/library.md and the JSON Schemas afresh from the program's own tables
+	$(BIN)/python -m rds library --markdown > docs/library.md
+	$(BIN)/python -m rds schema --out rds/cli/schemas
 
 # The newest page of Voilà and the newest extension for its widgets that were built with one JupyterLab. With later ones
 # the page is the same, and the browser's console has up to 13 warnings.

@@ -26,6 +26,7 @@ _NAMES = {
     "multisine": "rds.references",
     "chirp": "rds.references",
     "staircase": "rds.references",
+    "speed": "rds.references",
     "user": "rds.references",
     # machines, and what the three interfaces exchange
     "Machine": "rds.machines.machine",

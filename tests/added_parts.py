@@ -176,7 +176,10 @@ PARTS = {
             "rds/references/NAME.py": text("""
                 import numpy as np
 
+                from rds.core.quantities import Quantity
                 from rds.references.signal import Signal
+
+                OPTIONS = {"slope": Quantity("the speed", "V/s or mm/s")}
 
                 def ramp(slope: float) -> Signal:
                     def motion(t):
@@ -191,9 +194,12 @@ PARTS = {
         },
         run(
             "[reference]\nkind = 'ramp'\nslope = 10.0\n[controller]\nname = 'p'",
-            "float(round(result['X_reference'][-1], 9))",
-        ),
-        "0.99",
+            "float(round(result['X_reference'][-1], 9)), [f.name for f in signal_fields('ramp', 'mm')], "
+            "'\"slope\"' in schema_text('experiment')",
+        )
+        .replace("import rds\n", "import rds\nfrom rds.cli.schema import schema_text\n")
+        .replace("import rds\n", "import rds\nfrom rds.panels.equipment.fields import signal_fields\n", 1),
+        "(0.99, ['signal.slope'], True)",
     ),
     "machine": Part(
         "tiny",
@@ -248,7 +254,7 @@ PARTS = {
         {
             "rds/bus/modules/NAME/__init__.py": '"""The mirrored dialect: axes mounted the other way round."""\n',
             "rds/bus/modules/NAME/dialect.py": text("""
-                from rds.bus.modules.rds.dialect import IDENTIFIERS, answers
+                from rds.bus.modules.rds.dialect import IDENTIFIERS, SERVED_WITH, answers
 
                 def drivers():
                     from rds.bus.modules.rds.drivers import AxisDrivers
@@ -288,22 +294,23 @@ PARTS = {
     "format of bus logs": Part(
         "candump",
         {
-            "rds/bus/tools/log_lines.py": [
-                Line('    ".log": (_check_candump, _always),', '    ".candump": (_check_candump, _always),')
-            ],
-            "rds/bus/tools/logs.py": [
-                Line('_READERS = {".asc": can.ASCReader,', '_READERS[".candump"] = can.CanutilsLogReader'),
-                Line('ENDINGS = (".asc",', 'ENDINGS = (*ENDINGS, ".candump")'),
-            ],
-            "rds/bus/tools/log_writers.py": [
-                Line('            ".log": CandumpWriter,', '            ".candump": CandumpWriter,')
+            "rds/bus/tools/log_formats.py": [
+                Line(
+                    "FORMATS: dict[str, LogFormat] = {",
+                    '    ".candump": LogFormat("candump -L", "all", "can:CanutilsLogWriter", '
+                    'rules=log_lines.CANDUMP, reader="can:CanutilsLogReader"),',
+                )
             ],
         },
         "import can\nfrom rds.bus.tools.logs import LogFile, LogWriter\n"
+        "from rds.panels.data.state import DataState\nfrom rds.panels.session.session import Session\n"
         "log = LogWriter('a.candump')\n"
-        "log.write(can.Message(arbitration_id=0x12, is_extended_id=False, data=b'abc', timestamp=1.0))\n"
-        "log.close()\nfound = [bytes(message.data) for message in LogFile('a.candump')]\n",
-        "[b'abc']",
+        "log.write(can.Message(arbitration_id=0x22, is_extended_id=False, data=bytes(8), timestamp=1.0))\n"
+        "log.close()\nfound = [bytes(message.data) for message in LogFile('a.candump')] == [bytes(8)]\n"
+        "found = found, 'a.candump' in DataState(Session('.')).files()\n"
+        + command(["bus", "record", "--help"], "*found, '.candump' in done.output")
+        + command(["data", "describe", "a.candump", "--json"], "*found, 'answer_2.position' in done.output"),
+        "(True, True, True, True)",
     ),
     "format of logged data": Part(
         "jsonl",
@@ -322,17 +329,19 @@ PARTS = {
             """),
             "rds/identification/logs/tables.py": [
                 Line(
-                    '            raise InputError("it is no MDF file with measurements',
-                    '        elif ending == ".jsonl":\n'
-                    "            from rds.identification.logs.jsonl_table import read_jsonl\n\n"
-                    "            table = read_jsonl(path)",
+                    "FORMATS: tuple[DataFormat, ...] = (",
+                    '    DataFormat("lines of JSON", (".jsonl",), _late("jsonl_table", "read_jsonl")),',
                 )
             ],
         },
         "from pathlib import Path\n"
         "Path('a.jsonl').write_text('\\n'.join('{\"time\": %s, \"x\": %s}' % (k / 100, k * k) for k in range(50)))\n"
-        + command(["data", "describe", "a.jsonl", "--json"], '\'"format": "jsonl"\' in done.output'),
-        "True",
+        "from rds.panels.data.state import DataState\nfrom rds.panels.session.session import Session\n"
+        + command(
+            ["data", "describe", "a.jsonl", "--json"],
+            "'\"format\": \"jsonl\"' in done.output, 'a.jsonl' in DataState(Session('.')).files()",
+        ),
+        "(True, True)",
     ),
     "report": Part(
         "heights",

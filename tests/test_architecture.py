@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
@@ -55,6 +56,13 @@ def test_the_paths_that_it_names_exist() -> None:
     assert not [name for name in named if not (ROOT / name).exists()]
 
 
+def test_own_code_beside_a_library_says_why_in_its_docstring() -> None:
+    for file, _, why in rows("Own code beside a library"):
+        (name,) = IN_CODE.findall(file)
+        said = ast.get_docstring(ast.parse((ROOT / name).read_text(encoding="utf-8"))) or ""
+        assert why in " ".join(said.split()), name
+
+
 def test_the_modes_are_those_of_its_table() -> None:
     from rds.modes import load_mode, mode_names
 
@@ -105,7 +113,23 @@ for kind, use in json.loads(sys.stdin.read()).items():
     except BaseException:
         answer = traceback.format_exc()
     print("answer", json.dumps([kind, answer]), flush=True)
+from typer.testing import CliRunner
+from rds.cli.main import app
+for kind, words in json.loads(sys.argv[2]).items():
+    said = CliRunner().invoke(app, words, env={"COLUMNS": "400", "NO_COLOR": "1"}).output
+    print("answer", json.dumps(["--help " + kind, said]), flush=True)
 """
+LISTED = {  # what lists the parts of each kind
+    "": ["library", "--markdown"],
+    "interpolator": ["interpolate", "--help"],
+    "acceleration filter": ["interpolate", "--help"],
+    "mode": ["run", "--help"],
+    "dialect": ["machine", "serve", "--help"],
+    "format of bus logs": ["bus", "record", "--help"],
+    "format of logged data": ["data", "describe", "--help"],
+    "report": ["report", "--help"],
+    "gradebook": ["grade", "export", "--help"],
+}
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +141,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
         add(part, checkout)
     batch_in(work / "batch", [grade()])
     done = subprocess.run(
-        [sys.executable, "-c", USE_ALL, str(checkout)],
+        [sys.executable, "-c", USE_ALL, str(checkout), json.dumps(LISTED)],
         input=json.dumps({kind: part.use for kind, part in PARTS.items()}),
         cwd=work,
         env=os.environ | {"PYTHONPATH": str(checkout)},
@@ -131,3 +155,15 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 @pytest.mark.parametrize("kind", PARTS)
 def test_a_part_that_was_added_works(kind: str, answers: dict[str, str]) -> None:
     assert answers[kind] == PARTS[kind].expected
+
+
+@pytest.mark.parametrize("kind", [kind for kind in PARTS if kind != "command"])
+def test_a_part_that_was_added_is_in_the_document_of_the_library_without_another_edit(
+    kind: str, answers: dict[str, str]
+) -> None:
+    assert PARTS[kind].name in answers["--help "]
+
+
+@pytest.mark.parametrize("kind", [kind for kind in LISTED if kind])
+def test_a_part_that_was_added_is_named_by_its_command_s_help(kind: str, answers: dict[str, str]) -> None:
+    assert PARTS[kind].name in answers[f"--help {kind}"]

@@ -79,8 +79,9 @@ def known_keys(**table: Any) -> list[str]:
 )
 def test_keys_of_an_experiment(table: dict[str, Any]) -> None:
     keys = [key for key in known_keys(**table) if key not in ("controller", "model", "reference", "signal")]
-    assert set(keys) - {"axis", "interface", "timing", "bus", "network", "error_compensation"} <= NAMED
-    for key in set(keys) & {"interface", "timing", "bus", "error_compensation"}:
+    headed = {"interface", "timing", "bus", "error_compensation", "following_error"}
+    assert set(keys) - headed - {"axis", "network"} <= NAMED
+    for key in set(keys) & headed:
         assert f"### `[{key}]`" in TEXT
 
 

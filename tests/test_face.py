@@ -15,6 +15,7 @@ import scipy.signal
 from documents import ROOT, blocks
 
 import rds
+import rds.references
 
 TAU, K = 9.943e-3, 1.764
 
@@ -26,6 +27,12 @@ def test_what_there_is() -> None:
         thing = getattr(rds, name)
         assert name == "__version__" or (inspect.getdoc(thing) or "").strip(), f"rds.{name} has no docstring"
     assert rds.__version__.startswith("0.")
+
+
+def test_each_kind_of_signal_is_there() -> None:
+    assert set(rds.references.signal_kinds()) <= set(dir(rds))
+    reference = rds.speed([[0.0, 2.0], [1.0, 2.0], [2.0, 0.0]]).reference(1.5)
+    assert (reference.position, reference.velocity) == pytest.approx((2.75, 1.0))  # mm, mm/s
 
 
 def test_an_unknown_name_says_where_to_look() -> None:

@@ -87,10 +87,11 @@ ONLY = {
     ("interpolators", "results"): {"rds.results"},  # their tables
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
     # which frames are commands and answers; their logs
-    ("results.reports", "bus"): {"rds.bus.modules.rds.frames", "rds.bus.tools.logs"},
+    ("results.reports", "bus"): {"rds.bus.modules.rds.frames", "rds.bus.tools.logs", "rds.bus.tools.log_formats"},
     # what a log holds
     ("identification", "bus"): {
         *("rds.bus.modules.rds.frames", "rds.bus.tools.decode", "rds.bus.tools.logs", "rds.bus.tools.mf4"),
+        "rds.bus.tools.log_formats",
     },
     ("identification", "controllers"): {
         *("rds.controllers.tracking", "rds.controllers.design"),

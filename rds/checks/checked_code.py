@@ -82,7 +82,6 @@ def _student(thing: Any, role: str) -> StudentFile:
 
 
 def _model_functions(model: Model) -> dict[str, Callable[..., Any]]:
-    output = model.output
-    if output is None:
+    if model.output is None:
         return {"advance": model.advance}
-    return {"advance": model.advance, "output": lambda t, x, u, params: output(x)}
+    return {"advance": model.advance, "output": lambda t, x, u, params: model.seen(x, params, t)}

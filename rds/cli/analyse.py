@@ -31,9 +31,7 @@ def analyse(
             help="Sample period, s; by default the machine's. Of a message table: the period of messages without one.",
         ),
     ] = None,
-    dialect: Annotated[
-        str, typer.Option(help="What the modules speak: rds, oacs, cia402, or dcs (a serial line).")
-    ] = "rds",
+    dialect: Annotated[str, typer.Option(help="What the modules speak: {dialect}.")] = "rds",
     response_time: Annotated[
         float, typer.Option(help="Longest time from a command's arrival to a module's answer being ready, s.")
     ] = 0.0,

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
+from rds.bus.tools.log_formats import in_words
 from rds.cli.buses import BUILTIN, Bitrate, Channel, ChosenBus, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, print_json, refusals, stdout_kept, until_ctrl_c, writes_files
 
@@ -79,9 +80,7 @@ def monitor(
 @app.command()
 @writes_files
 def record(
-    file: Annotated[
-        Path, typer.Argument(help="The log: .asc .blf .log (candump) .trc .csv .db .mf4, or text with .gz.")
-    ],
+    file: Annotated[Path, typer.Argument(help=f"The log; its ending is its format: {in_words()}.")],
     interface: Interface = None,
     channel: Channel = None,
     experiment: Experiment = None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
+from rds.cli.library import NamesParts
 
 if TYPE_CHECKING:
     from rds.identification.fit.friction_curve import FrictionCurve
@@ -16,10 +17,10 @@ if TYPE_CHECKING:
 app = typer.Typer(no_args_is_help=True, help="Logged data: what a file holds, and whether it can be believed.")
 
 
-@app.command()
+@app.command(cls=NamesParts)
 @writes_files
 def describe(
-    file: Annotated[Path, typer.Argument(help="CSV, MAT, Parquet, a bus log, or a result of rds.")],
+    file: Annotated[Path, typer.Argument(help="A result of rds, or a file: {data-file}.")],
     map_: Annotated[
         Path | None, typer.Option("--map", help="What the columns mean (TOML); else FILE.map.toml beside it.")
     ] = None,

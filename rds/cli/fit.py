@@ -25,13 +25,9 @@ def fit(
     logs: Annotated[list[Path], typer.Argument(help="Logs, fitted together: CSV, MAT, Parquet, bus logs, results.")],
     structure: Annotated[
         str,
-        typer.Option(
-            "--structure", "-s", help="axis, axis-mass, axis-inertia, spindle, or a model of your own: FILE.py."
-        ),
+        typer.Option("--structure", "-s", help="{structure}, or a model of your own: FILE.py."),
     ],
-    method: Annotated[
-        str | None, typer.Option("--method", "-m", help="simulation, inverse-dynamics, step or frequency.")
-    ] = None,
+    method: Annotated[str | None, typer.Option("--method", "-m", help="{method}.")] = None,
     option: Annotated[
         list[str] | None, typer.Option("--option", help="Of the structure: viscous, stribeck, offset, delay, ...")
     ] = None,

@@ -15,9 +15,7 @@ def export(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `rds grade run -o` made.")],
     to: Annotated[
         str,
-        typer.Option(
-            help="nbgrader, moodle, moodle-feedback, canvas, brightspace, blackboard, gradescope, lti or prairielearn."
-        ),
+        typer.Option(help="{gradebook}."),
     ],
     file: Annotated[
         Path | None, typer.Option("--out", "-o", help="The file, or folder, to write; by default a new one in OUT.")

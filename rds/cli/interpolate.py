@@ -39,13 +39,13 @@ def interpolate(
     ] = None,
     period: Annotated[float, typer.Option(help="Sample period, s.")] = 0.001,
     method: Annotated[
-        str, typer.Option("--method", "-m", help="Interpolator: a library name, or a file with interpolate().")
+        str, typer.Option("--method", "-m", help="Interpolator: {interpolator}, or a file with interpolate().")
     ] = _METHOD,
     arc_method: Annotated[str | None, typer.Option(help="Another one for arcs, with its default options.")] = None,
     option: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="Of --method: blu=0.001, steps=39, a file's params.")
     ] = None,
-    acceleration: Annotated[str | None, typer.Option(help="Filter on top: linear, exponential or s-shape.")] = None,
+    acceleration: Annotated[str | None, typer.Option(help="Filter on top: {acceleration}.")] = None,
     acceleration_time: Annotated[
         float | None, typer.Option(help="How long the velocity rises, s; of exponential its time constant.")
     ] = None,

@@ -1,6 +1,10 @@
 """The command line: thin over the rest. What takes long to import is imported by the command that needs it.
 
 Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained on stderr.
+
+A command is a function in a file of its own whose arguments say their help (typer); its docstring is the command's. It
+is imported and added here. What fails in it is raised as InputError inside `common.refusals()`; one that writes has the
+decorator `common.writes_files`, one whose help lists parts of a library the class `library.NamesParts`.
 """
 
 from __future__ import annotations
@@ -37,6 +41,7 @@ from rds.cli import (
     jobs,
     jog,
     learn,
+    library,
     machine_watch,
     machines,
     modules,
@@ -90,28 +95,29 @@ app.add_typer(network.app, name="network")
 app.add_typer(jobs.app, name="jobs")
 app.add_typer(data.app, name="data")
 app.add_typer(cutting.app, name="cutting")
-bus.app.command()(analyse.analyse)
+bus.app.command(cls=library.NamesParts)(analyse.analyse)
 bus.app.command()(fault.fault)
 bus.app.command()(fault.nodes)
 app.command()(scan.scan)
 app.command()(estop.estop)
 app.command()(doctor.doctor)
 app.command()(jog.jog)
-app.command()(reports.report)
-app.command()(fit.fit)
+app.command(cls=library.NamesParts)(reports.report)
+app.command(cls=library.NamesParts)(fit.fit)
+app.command()(library.library)
 app.command()(excite.excite)
 app.command()(validate.validate)
 app.command()(forces.forces)
 app.command("app")(app_page)
 app.command()(docs.docs)
 app.command()(schema.schema)
-app.command()(interpolate.interpolate)
+app.command(cls=library.NamesParts)(interpolate.interpolate)
 app.command()(robustness.robustness)
 app.command()(learn.learn)
 app.add_typer(design.app, name="design")
 app.add_typer(grade.app, name="grade")
 grade.app.command()(grade_run.run)
-grade.app.command()(grade_export.export)
+grade.app.command(cls=library.NamesParts)(grade_export.export)
 grade.app.command()(grade_lti.lti)
 grade.app.command()(grade_review.review)
 grade.app.command()(grade_review.regrade)
@@ -260,7 +266,7 @@ def machine_list(json: Json = False) -> None:
             typer.echo(f"  {axis.name:8} node {axis.node}, {low:g} to {high:g} {axis.unit}")
 
 
-@machine_app.command("serve")
+@machine_app.command("serve", cls=library.NamesParts)
 def machine_serve(
     name: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
     interface: Interface = None,
@@ -268,7 +274,7 @@ def machine_serve(
     experiment: Experiment = None,
     dialect: Annotated[
         str | None,
-        typer.Option(help="What the modules speak: rds, oacs, cia402 or dcs; by default as in \\[bus], or rds."),
+        typer.Option(help="What the modules speak: {dialect}; by default as in \\[bus], or rds."),
     ] = None,
     bitrate: Annotated[
         int | None, typer.Option(min=1, help="Bit rate, bit/s; without it the built-in bus has no bit timing.")
@@ -298,7 +304,7 @@ def machine_serve(
 ) -> None:
     """Run the machine's axis modules as CAN nodes, or as units on a serial line (--dialect dcs), until Ctrl-C."""
     with refusals():
-        from rds.bus.modules.dialects import DEFAULT, interface_of, serve_machine
+        from rds.bus.modules.dialects import DEFAULT, check_served_with, interface_of, serve_machine
         from rds.bus.tools.link import BUILTIN, bus_name, bus_options, default_channel
         from rds.machines import load_machine
 
@@ -318,22 +324,11 @@ def machine_serve(
         options = bus_options(table)  # its faults are the run's, and [bus.cia402] tells a host of its drives
         if bitrate is not None:
             options["bitrate"] = bitrate
-        if drift is not None:
-            if spoken not in ("rds", "dcs"):
-                raise InputError(f"--drift {drift}: modules of dialect {spoken} have no clock that they tell")
-            options["drift"] = drift
-        if quirks is not None:
-            if spoken != "cia402":
-                raise InputError(f"--quirks {quirks}: only simulated drives (--dialect cia402) have them")
-            options["quirks"] = quirks
-        if eds is not None:
-            if spoken != "cia402":
-                raise InputError(f"--eds {eds}: only simulated drives (--dialect cia402) have one")
-            options["eds"] = eds
-        if cut is not None:
-            if spoken != "rds":
-                raise InputError(f"--cut {cut}: modules of dialect {spoken} have no load cell; those of rds may")
-            options["cut"] = str(cut)
+        own = {"drift": drift, "quirks": quirks, "eds": eds, "cut": None if cut is None else str(cut)}
+        for option, value in own.items():
+            if value is not None:
+                check_served_with(spoken, option, value)
+                options[option] = value
         if faults is not None:
             from rds.bus.medium.fault_file import read_faults
 

@@ -14,10 +14,7 @@ from rds.cli.common import Json, print_json, refusals, writes_files
 def report(
     kind: Annotated[
         str,
-        typer.Argument(
-            help="accuracy, moves, response, current, vibration, reconfiguration, speed, flatness, return-error, "
-            "unsynchronized-rapids or path-error."
-        ),
+        typer.Argument(help="{report}."),
     ],
     data: Annotated[
         list[Path] | None,

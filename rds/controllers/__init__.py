@@ -1,8 +1,17 @@
 """Control laws, one per file, by name.
 
-Each file has `law`, a pure function on floats and tuples of floats (numba compiles it as it stands),
-`control`, the fixed interface over it, and `make`, which checks the options and fills in tuned gains. The laws for
-loops with delay (`lqg`, `smith`) keep voltages that are on their way: they have no `law`, and are not compiled.
+A module of a law has
+
+- `OPTIONS`: what a user may set, by name, each a declaration of `rds.core.quantities` (what it means, unit, range);
+- `make(axis_model, T, converter_range, *, unit="mm", **options) -> Controller`, as `library_controller` describes it:
+  it checks the options (`rds.core.options.read_options`) and fills in tuned gains. What the `Controller` names as
+  `tunable` can be changed while it runs;
+- `control(t, r, y, state, params) -> (voltage, next_state)`, the fixed interface, which `make` hands to `Controller`;
+- `SPINDLE = False`, where it is not for an axis whose speed is measured;
+- `law(position, velocity, acceleration, y, state, coefficients) -> (voltage, next_state)`, where a run may be compiled:
+  the same on floats and tuples of floats alone, which numba compiles as it stands. `control` then calls it with
+  `params["coefficients"]`. The laws for loops with delay (`lqg`, `smith`) keep voltages that are on their way: they
+  have no `law`.
 """
 
 from __future__ import annotations
@@ -36,8 +45,13 @@ def controller_names() -> list[str]:
 
 
 def controller_module(name: str) -> ModuleType:
-    """The module of the controller called `name`, with its `law`, `control` and `make`."""
+    """The module of the controller called `name`, with its `OPTIONS`, `control` and `make`."""
     return LIBRARY.module(name)
+
+
+def is_for_spindle(name: str) -> bool:
+    """Whether the law called `name` can drive an axis whose speed is measured."""
+    return bool(getattr(LIBRARY.module(name), "SPINDLE", True))
 
 
 def library_controller(

@@ -29,6 +29,7 @@ from rds.core.quantities import Declaration, Quantity
 from rds.core.types import Controller, Reference, Source
 
 NAME = "feedforward"
+SPINDLE = False
 COMPENSATION = {
     "friction_plus": Quantity("Coulomb friction while moving forward", "mm/s", low=0.0),
     "friction_minus": Quantity("Coulomb friction while moving backward", "mm/s", high=0.0),

@@ -26,6 +26,7 @@ from rds.core.quantities import Quantity
 from rds.core.types import Controller, Reference, Source
 
 NAME = "lqg"
+SPINDLE = False
 OPTIONS = {
     "delay": Quantity("from a sampling instant until its voltage acts", "s", 0.0, 1000.0),
     "error": Quantity("position error that costs as much as `voltage`", "mm", above=0.0),

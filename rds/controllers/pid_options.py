@@ -22,6 +22,11 @@ FEEDFORWARD = {
     "FF0": Quantity("zeroth-order feedforward", "V per mm of reference"),
     "FF1": Quantity("first-order feedforward", "V per mm/s of reference"),
     "FF2": Quantity("second-order feedforward", "V per mm/s² of reference"),
+    "FF3": Quantity("third-order feedforward, of the change of the acceleration", "V per mm/s³ of reference"),
+}
+COMMAND_LIMITS = {
+    "maxcmdD": Quantity("limit of the velocity that is fed forward; 0 = no limit", "mm/s", low=0.0),
+    "maxcmdDD": Quantity("limit of the acceleration that is fed forward; 0 = no limit", "mm/s²", low=0.0),
 }
 DEADBAND = {"deadband": Quantity("error that counts as none; 0 = none", "mm", low=0.0)}
 ERROR_LIMITS = {

@@ -22,6 +22,7 @@ from rds.core.quantities import AnyValue, Choice, Declaration, Quantity
 from rds.core.types import Controller, Reference, Source
 
 NAME = "smith"
+SPINDLE = False
 _INNER = {
     "p": proportional,
     "pid": pid,

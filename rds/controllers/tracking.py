@@ -20,6 +20,7 @@ from rds.core.quantities import AnyValue, Declaration, Items, Quantity
 from rds.core.types import Controller, Reference, Source
 
 NAME = "tracking"
+SPINDLE = False
 _REAL = Quantity("real pole", "1/s")
 _PAIR = Items("pole", Quantity("real or imaginary part", "1/s"), "[real, imaginary]", 2)
 OPTIONS: Mapping[str, Declaration] = {

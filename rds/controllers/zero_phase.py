@@ -27,6 +27,7 @@ from rds.core.quantities import Declaration, Quantity
 from rds.core.types import Controller, Source
 
 NAME = "zero-phase"
+SPINDLE = False
 LEAD = Quantity("samples that a voltage acts later than in a loop without a bus", "", 0, 100, default=0, whole=True)
 OPTIONS: Mapping[str, Declaration] = {**feedforward.OPTIONS, "lead": LEAD}
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.integrate import rk4
+from rds.core.timed_motion import TimedMotion
 from rds.core.types import Controller, Model, Reference, Source
 
 Rows = tuple[tuple[float, ...], ...]
@@ -74,11 +75,12 @@ def as_model(obj: Any, T: float) -> Model:
         params = _matrices(sys.sample(T, method="zoh") if continuous else sys)
         _check_no_jump(sys, params["D"][0][0] != 0.0)
         output = partial(_dot, params["C"][0])
-        return Model(partial(_linear_advance, period=T), state, params, output, Source(_name(sys)))
+        flow = np.hstack([np.asarray(sys.A, dtype=float), np.asarray(sys.B, dtype=float)]) if continuous else None
+        return Model(partial(_linear_advance, period=T, flow=flow), state, params, output, Source(_name(sys)))
     reads = partial(_nonlinear_output, sys=sys)
     _check_no_jump(sys, reads(state) != reads(state, voltage=1.0))
     advance = partial(_nonlinear_advance, sys=sys, period=T, continuous=continuous)
-    return Model(advance, state, dict(sys.params), reads, Source(_name(sys)))
+    return Model(advance, state, dict(sys.params), reads, Source(_name(sys)), motion=TimedMotion, timed=True)
 
 
 def _system(obj: Any, role: str) -> Any:
@@ -172,7 +174,16 @@ def _linear_control(t: float, r: Reference, y: float, state: Sequence[float], pa
     return float(_dot(C[0], state) + _dot(D[0], inputs)), moved
 
 
-def _linear_advance(x: Sequence[float], u: float, T: float, params: Any, *, period: float) -> tuple[float, ...]:
+def _linear_advance(
+    x: Sequence[float], u: float, T: float, params: Any, *, period: float, flow: np.ndarray | None
+) -> tuple[float, ...]:
+    """One sample; of a continuous system, whose `flow` is [A B], also any part of one, exactly."""
+    if flow is not None and not isclose(T, period, rel_tol=1e-9):
+        from scipy.linalg import expm  # a second that most runs can do without
+
+        n = len(x)
+        moving = expm(T * np.vstack([flow, np.zeros((1, n + 1))]))[:n]
+        return tuple((moving @ [*x, u]).tolist())
     _check_period(T, period)
     return tuple(_dot(row, x) + b[0] * u for row, b in zip(params["A"], params["B"], strict=True))
 
@@ -186,10 +197,11 @@ def _nonlinear_control(
 
 
 def _nonlinear_advance(
-    x: Sequence[float], u: float, T: float, params: Any, *, sys: Any, period: float, continuous: bool
+    x: Sequence[float], u: float, T: float, params: Any, *, sys: Any, period: float, continuous: bool, t: float = 0.0
 ) -> tuple[float, ...]:
-    _check_period(T, period)
-    return _moved(sys, 0.0, np.array(x, dtype=float), np.array(u, dtype=float).reshape(1), T, params, continuous)
+    if not continuous:
+        _check_period(T, period)
+    return _moved(sys, t, np.array(x, dtype=float), np.array(u, dtype=float).reshape(1), T, params, continuous)
 
 
 def _moved(
@@ -204,8 +216,12 @@ def _moved(
     return tuple(answer.tolist())
 
 
-def _nonlinear_output(x: Sequence[float], *, sys: Any, voltage: float = 0.0) -> float:
-    answer = sys.output(0.0, np.array(x, dtype=float), np.array([voltage]), params=sys.params)
+def _nonlinear_output(
+    x: Sequence[float], *, sys: Any, voltage: float = 0.0, t: float = 0.0, params: Any = None
+) -> float:
+    answer = sys.output(
+        t, np.array(x, dtype=float), np.array([voltage]), params=sys.params if params is None else params
+    )
     return float(np.asarray(answer, dtype=float).ravel()[0])
 
 

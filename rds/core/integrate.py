@@ -1,4 +1,8 @@
-"""Fixed-step integration of a differential equation whose input is held."""
+"""Fixed-step integration of a differential equation whose input is held.
+
+Our own, because `solve_ivp` chooses its steps, and stalls where friction reverses; equal steps cost and err the
+same in every sample, so that a run repeats to the bit.
+"""
 
 from __future__ import annotations
 

@@ -109,20 +109,33 @@ class Model:
     hands in its own `motion`. `fitted` is the model file that the numbers came from, if they did.
     `has_velocity` says that the second state is the axis's velocity, and that its motion has it as `velocity`.
     `told` names other attributes of its motion, with their units, that are recorded where the model is the plant.
+    The equations of a `timed` model know the time: its `advance` and `output` also take `t`, s since the run began, and
+    `output` takes `params` (else they are of t = 0 and of the model's own parameters).
     """
 
-    advance: Callable[[Sequence[float], float, float, Mapping[str, Any]], Sequence[float]]
+    advance: Callable[..., Sequence[float]]
     initial_state: Sequence[float]
     params: Mapping[str, Any] = field(default_factory=dict)
-    output: Callable[[Sequence[float]], float] | None = None
+    output: Callable[..., float] | None = None
     source: Source = Source("user-defined")
     motion: Callable[[Model, float], Any] | None = None
     fitted: Source | None = None
     has_velocity: bool = False
     told: Mapping[str, str] = field(default_factory=dict)
+    timed: bool = False
 
     def __repr__(self) -> str:
         return _named(self)
+
+    def moved(self, x: Sequence[float], u: float, T: float, params: Mapping[str, Any], t: float) -> Sequence[float]:
+        """The state `T` s after the state `x` at the time `t`, s, under the voltage `u`."""
+        return self.advance(x, u, T, params, t=t) if self.timed else self.advance(x, u, T, params)
+
+    def seen(self, x: Sequence[float], params: Mapping[str, Any], t: float) -> float:
+        """What the encoder sees of the state `x` at the time `t`, s."""
+        if self.output is None:
+            return x[0]
+        return self.output(x, t=t, params=params) if self.timed else self.output(x)
 
 
 def _named(part: Controller | Model) -> str:
@@ -136,6 +149,7 @@ class Ending(StrEnum):
     DONE = "done"  # every sample was taken
     STOPPED = "stopped"  # asked to stop
     OVERLOADED = "overloaded"  # more late samples in a row than the late policy allows
+    FOLLOWING_ERROR = "following error"  # an axis was further from its reference than [following_error] allows
     FAULT = "fault"  # the student's code broke its contract or raised
     MACHINE_LOST = "machine lost"  # a module stopped answering, or the bus failed
     ADAPTER_LOST = "adapter lost"  # the adapter between computer and bus was unplugged, or its line garbled

@@ -6,6 +6,9 @@ The increments ΔX(k) of each axis pass a filter with weights that sum up to 1:
 
 The total distance is that of the interpolator, and the motion takes n - 1 samples more. All axes pass the same filter:
 a straight move stays straight, the radius of an arc becomes smaller, and a corner is rounded.
+
+A module of a filter has `OPTIONS`, times in s as declarations of `rds.core.quantities`, with their `DEFAULTS`;
+`weights(T, params)`, the Kᵢ for samples of `T` s; and `MULTIPLIERS`, whether a user may give the Kᵢ themselves.
 """
 
 from __future__ import annotations

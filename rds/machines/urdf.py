@@ -1,6 +1,9 @@
 """URDF, the robot description that simulators and ROS read: machines written in it, and read from it.
 
 Lengths are in m and angles in radians there. Its origin `rpy` is equation (1): turned about z, y and x.
+
+Our own, because `yourdfpy` and its like load meshes, too; six numbers of each joint are wanted, which Python's
+own XML reader gives.
 """
 
 from __future__ import annotations

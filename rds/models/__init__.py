@@ -1,4 +1,9 @@
-"""Plant models, one per file, by name. Each file has `PARAMETERS` and `make(**params) -> Model`."""
+"""Plant models, one per file, by name.
+
+Each file has `PARAMETERS`, by name, each a declaration of `rds.core.quantities` (meaning, unit, range), and
+`make(**params) -> Model`, which checks them (`rds.core.options.read_options`). What a model is, `rds.core.types.Model`
+says.
+"""
 
 from __future__ import annotations
 

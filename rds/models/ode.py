@@ -16,6 +16,7 @@ import numpy as np
 
 from rds.core.errors import ContractError, InputError
 from rds.core.integrate import SUBSTEPS, rk4
+from rds.core.timed_motion import TimedMotion
 from rds.core.types import Model, Source
 from rds.core.values import shown
 
@@ -32,22 +33,23 @@ def ode_model(
 ) -> Model:
     """A model from `derivatives(t, x, u, params) -> dx/dt` and, optionally, `output(t, x, u, params)`.
 
-    x holds position (mm), velocity (mm/s) and whatever follows; u = [voltage] in V. `Model.advance` starts each
-    sample at t = 0; in motion, t is the time since the run began. Raises InputError for a bad initial state or number
-    of substeps, and, while running, ContractError for derivatives of the wrong size or kind.
+    x holds position (mm), velocity (mm/s) and whatever follows; u = [voltage] in V, and t is the time since the run
+    began, s. Raises InputError for a bad initial state or number of substeps, and, while running, ContractError for
+    derivatives of the wrong size or kind.
     """
     if isinstance(substeps, bool) or not isinstance(substeps, int) or substeps < 1:
         raise InputError(f"model: substeps = {substeps!r} must be a whole number of 1 or more")
     start = _initial_state(initial_state)
-    step = partial(_advance_by_rk4, derivatives=derivatives, substeps=substeps)
+    own = dict(params or {})
     return Model(
-        advance=step,
+        advance=partial(_advance_by_rk4, derivatives=derivatives, substeps=substeps),
         initial_state=start,
-        params=dict(params or {}),
-        output=_output(output, params or {}, len(start)),
+        params=own,
+        output=_output(output, own),
         source=source or Source(_name(derivatives)),
-        motion=partial(OdeMotion, step=step),
+        motion=TimedMotion,
         has_velocity=_has_velocity(start, output),
+        timed=True,
     )
 
 
@@ -64,47 +66,17 @@ def advance_model(
     running, ContractError for a state of the wrong size or kind.
     """
     start = _initial_state(initial_state)
+    own = dict(params or {})
     return Model(
         advance=partial(_advance_by_student, function=advance),
         initial_state=start,
-        params=dict(params or {}),
-        output=_output(output, params or {}, len(start)),
+        params=own,
+        output=_output(output, own),
         source=source or Source(_name(advance)),
+        motion=TimedMotion if output is not None else None,
         has_velocity=_has_velocity(start, output),
+        timed=output is not None,
     )
-
-
-class OdeMotion:
-    """A student's model in motion, which knows the time since the run began: `contracts.Motion`."""
-
-    dead_time = 0.0
-
-    def __init__(self, model: Model, T: float, step: Function):
-        self.state = tuple(float(value) for value in model.initial_state)
-        self._model, self._T, self._step = model, T, step
-        self._samples = 0
-        self._into = 0.0  # s: how far `move` has come since a sample began
-
-    def read(self) -> float:
-        """The output now: position, mm, unless the model has its own `output`."""
-        return self._model.output(self.state) if self._model.output else self.state[0]
-
-    @property
-    def velocity(self) -> float:
-        """The second state: mm/s, unless the model has its own `output`."""
-        return self.state[1]
-
-    def write(self, voltage: float) -> None:
-        """Move on by one sample of constant `voltage`, V."""
-        self.state = self._step(self.state, voltage, self._T, self._model.params, t=self._samples * self._T)
-        self._samples += 1
-
-    def move(self, voltage: float, time: float) -> None:
-        """Move on by `time` s of constant `voltage`, V."""
-        self.state = self._step(self.state, voltage, time, self._model.params, t=self._samples * self._T + self._into)
-        self._into += time
-        if self._into >= self._T * (1.0 - 1e-9):
-            self._samples, self._into = self._samples + 1, 0.0
 
 
 def _has_velocity(start: Sequence[float], output: Function | None) -> bool:
@@ -131,7 +103,7 @@ def _checked(derivatives: Function, size: int, t: float, x: np.ndarray, u: np.nd
 
 
 def _advance_by_student(
-    x: Sequence[float], u: float, T: float, params: Mapping[str, Any], *, function: Function
+    x: Sequence[float], u: float, T: float, params: Mapping[str, Any], *, function: Function, t: float = 0.0
 ) -> tuple[float, ...]:
     state = np.array(x, dtype=float)
     return tuple(_vector(function(state, _voltage(u), T, params), state.size, "advance", "the next x").tolist())
@@ -171,13 +143,20 @@ def _numbers(answer: Any) -> np.ndarray:
     return array.astype(float, copy=False).ravel()
 
 
-def _output(output: Function | None, params: Mapping[str, Any], size: int) -> Callable[[Sequence[float]], float] | None:
-    return None if output is None else partial(_output_by_student, function=output, params=dict(params))
+def _output(output: Function | None, own: Mapping[str, Any]) -> Callable[..., float] | None:
+    return None if output is None else partial(_output_by_student, function=output, own=own)
 
 
-def _output_by_student(x: Sequence[float], *, function: Function, params: Mapping[str, Any]) -> float:
+def _output_by_student(
+    x: Sequence[float],
+    *,
+    function: Function,
+    own: Mapping[str, Any],
+    t: float = 0.0,
+    params: Mapping[str, Any] | None = None,
+) -> float:
     # The encoder reads before the voltage of this sample is known, so an output cannot depend on it.
-    answer = function(0.0, np.array(x, dtype=float), np.zeros(1), params)
+    answer = function(t, np.array(x, dtype=float), np.zeros(1), own if params is None else params)
     values = _flat(answer)
     if values.size == 0:
         raise ContractError(f"output() returned {shown(answer, 200)}; it must return the measured position, one number")

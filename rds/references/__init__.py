@@ -1,6 +1,7 @@
 """Signals by kind: voltages for system tests, references for controllers.
 
-A kind is a function that returns a `Signal`; its arguments are the options that a TOML table may give.
+A kind is a function that returns a `Signal`; its arguments are the options that a TOML table may give. `OPTIONS` of its
+module declares each of them (`rds.core.quantities`: meaning, unit, range), for the schema, the panels and `--help`.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ __all__ = [
     "multisine",
     "sample",
     "sample_voltage",
+    "signal_function",
     "signal_kinds",
     "signal_options",
     "sinusoid",
@@ -57,6 +59,11 @@ _KINDS: Mapping[str, Callable[..., Signal]] = MappingProxyType(
 def signal_kinds() -> list[str]:
     """The kinds of signals there are."""
     return list(_KINDS)
+
+
+def signal_function(kind: str) -> Callable[..., Signal]:
+    """The function that makes signals of this kind."""
+    return _KINDS[kind]
 
 
 def signal_options(kind: str) -> Table:

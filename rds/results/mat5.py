@@ -2,6 +2,8 @@
 
 The format: MathWorks, *MAT-File Format*, level 5. A file is a header of 128 bytes and elements: a tag (type, length)
 and data padded to 8 bytes. A variable is an element of elements: flags, dimensions, name, data; it may be compressed.
+
+Our own, because `scipy.io` takes half a second to import, and every run saves a MAT file.
 """
 
 from __future__ import annotations

@@ -141,6 +141,19 @@ def test_pid_without_filter_is_linuxcncs_arithmetic():
     assert u == 5.0
 
 
+def test_what_is_fed_forward_is_limited_as_linuxcncs_and_has_a_third_order():
+    """maxcmdD and maxcmdDD limit the command's derivatives before FF1 and FF2, FF3 takes the change of the second."""
+    none = {"Pgain": 0.0, "Igain": 0.0, "Dgain": 0.0}
+    controller = make("pid", **none, FF1=0.1, FF2=0.01, FF3=1e-4, maxcmdD=20.0, maxcmdDD=100.0)
+    state, p = controller.initial_state, controller.params
+    u, state = controller.control(0.0, Reference(0.0, 30.0, 50.0), 0.0, state, p)
+    assert u == pytest.approx(0.1 * 20.0 + 0.01 * 50.0)  # there is no jerk before the second sample
+    u, state = controller.control(T, Reference(0.0, -30.0, 60.0), 0.0, state, p)
+    assert u == pytest.approx(-0.1 * 20.0 + 0.01 * 60.0 + 1e-4 * 10.0 / T)
+    u, state = controller.control(2 * T, Reference(0.0, 10.0, 500.0), 0.0, state, p)
+    assert u == pytest.approx(0.1 * 10.0 + 0.01 * 100.0 + 1e-4 * 40.0 / T)
+
+
 def test_derivative_filter_is_exact_for_a_straight_error():
     controller = make("pid", Pgain=0.0, Igain=0.0, Dgain=1.0, FF1=0.0, FF2=0.0, derivative_filter=0.004)
     state, answers = controller.initial_state, []
@@ -193,7 +206,8 @@ def test_numba_compiles_the_law_unchanged_to_the_same_bits(name):
     law = controller_module(name).law
     compiled = numba.njit(law)
     random = np.random.default_rng(1)
-    options = {"pid": {"deadband": 0.01, "maxerror": 1.0, "maxerrorI": 0.1, "maxerrorD": 30.0}}.get(name, {})
+    limits = {"deadband": 0.01, "maxerror": 1.0, "maxerrorI": 0.1, "maxerrorD": 30.0, "maxcmdD": 4.0, "maxcmdDD": 40.0}
+    options = {"pid": limits | {"FF3": 1e-5}}.get(name, {})
     controller = make(name, **options)
     c = controller.params["coefficients"]
     for started in (0.0, 1.0):

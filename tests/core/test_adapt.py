@@ -185,8 +185,12 @@ def test_a_nonlinear_model_whose_output_jumps_is_refused():
         as_model(leaky, T)
 
 
-def test_an_adapted_model_is_for_one_period():
+def test_a_continuous_model_advances_by_any_time_and_a_discrete_one_by_its_period():
     model = as_model(AXIS, T)
     assert model.params["A"][1][1] == pytest.approx(exp(-T / TAU))
+    for time in (0.3 * T, 2 * T):
+        _, velocity = model.advance(model.initial_state, 1.0, time, model.params)
+        assert velocity == pytest.approx(K * (1.0 - exp(-time / TAU)), rel=1e-12)
+    sampled = as_model(control.sample_system(AXIS, T), T)
     with pytest.raises(InputError, match="made for a sample period"):
-        model.advance(model.initial_state, 1.0, 2 * T, model.params)
+        sampled.advance(sampled.initial_state, 1.0, 2 * T, sampled.params)

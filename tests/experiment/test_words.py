@@ -167,8 +167,8 @@ def test_what_is_wrong_is_named(alone: Path, change: str, line: int | None, said
         (
             edit("-axis\n").replace("duration", "axes = ['X', 'Y']\nduration") + "[axis.Y.controler]\nname = 'p'\n",
             16,
-            "unknown key 'controler' in .axis.Y.; known keys: controller, error_compensation, model, reference, "
-            "signal; did you mean",
+            "unknown key 'controler' in .axis.Y.; known keys: controller, error_compensation, following_error, model, "
+            "reference, signal; did you mean",
         ),
         (
             edit("-axis\n").replace("duration", "axes = ['X', 'Y']\nduration") + "[axis.Y.controller]\nname = 'pd'\n",

@@ -38,6 +38,7 @@ OF_EXPERIMENTS = {
     "interface",
     "saturation",
     "error_compensation",
+    "following_error",
 }
 
 

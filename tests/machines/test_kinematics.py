@@ -51,6 +51,27 @@ def test_the_five_axis_tables_move_as_linuxcnc_s_with_conventional_directions(
     np.testing.assert_allclose(got[:3, :3], table @ tilt, atol=1e-12)
 
 
+@settings(max_examples=20, deadline=None)
+@given(shoulder=st.floats(-170, 170), elbow=st.floats(20, 150), quill=st.floats(-100, 100))
+def test_a_scara_arm_of_links_moves_as_linuxcnc_s_scarakins(
+    tmp_path_factory: pytest.TempPathFactory, shoulder: float, elbow: float, quill: float
+) -> None:
+    """Forward in closed form, x = 150 cos a + 120 cos (a + c); the numerical inverse returns to the joints near by."""
+    links = link(name="shoulder", axis="A", joint="ZA", offset=[0.0, 0.0, 200.0])
+    links += link(name="elbow", axis="C", joint="ZA", offset=[150.0, 0.0, 0.0])
+    links += link(name="quill", axis="Z", joint="Z", offset=[120.0, 0.0, 0.0])
+    tables = '[tool]\nlink = "quill"\nangles = [180.0, 0.0, 0.0]\n[work]\nlink = "bed"\n'
+    kinematics = machine(tmp_path_factory.mktemp("scara"), "ACZ", links + tables).kinematics
+    joints = {"A": shoulder, "C": elbow, "Z": quill}
+    tip = kinematics.forward(joints)[..., :3, 3].ravel()
+    a, both = np.radians(shoulder), np.radians(shoulder + elbow)
+    place = [150 * np.cos(a) + 120 * np.cos(both), 150 * np.sin(a) + 120 * np.sin(both), 200 + quill]
+    np.testing.assert_allclose(tip, place, atol=1e-9)
+    found = kinematics.inverse(kinematics.forward(joints), near={name: q + 3.0 for name, q in joints.items()})
+    ordered = [joints[name] for name in kinematics.joints]
+    np.testing.assert_allclose(np.ravel(found), ordered, atol=1e-6)
+
+
 def test_the_oracle_is_linuxcnc_s_formula() -> None:
     """The first component of xyzacKinematicsForward, written out as there with con = 1, for one pose."""
     x, y, z, a, c = 31.0, -17.0, 60.0, np.radians(35.0), np.radians(-70.0)

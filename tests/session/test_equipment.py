@@ -52,6 +52,18 @@ def test_a_spindle_is_not_offered_what_it_cannot_have(tmp_path: Path) -> None:
     assert equipment.parameters == ["controller.pole", "controller.pole_imaginary", "controller.observer_pole"]
 
 
+def test_a_following_error_is_watched_where_one_is_given(tmp_path: Path) -> None:
+    equipment = Equipment(Session(tmp_path), "control")
+    assert "following_error" not in equipment.table()
+    choose(equipment, ferror="0,5")
+    assert equipment.table()["following_error"] == {"ferror": 0.5}
+    choose(equipment, system="spindle")
+    assert "ferror" not in equipment.shown and "following_error" not in equipment.table()
+    choose(equipment, system="X")
+    equipment.first_sine()
+    assert "following_error" not in equipment.table()
+
+
 @pytest.mark.parametrize("amplitude", [50.0, 300.0])  # rev/min: within an axis's range in mm, and beyond it
 def test_what_was_kept_for_a_spindle_is_there_when_the_page_is_opened_again(tmp_path: Path, amplitude: float) -> None:
     choose(Equipment(Session(tmp_path), "control"), system="spindle", amplitude=amplitude, offset=400.0)

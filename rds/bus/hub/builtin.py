@@ -2,6 +2,9 @@
 
 `can.Bus(interface="rds", channel="mini-cnc")`. The first bus that opens a channel starts its hub (hub.py), which
 carries all frames in one order and loses none: when a node reads too slowly, senders wait.
+
+Our own, because python-can's `virtual` lives in one process and its `udp_multicast` loses frames of a burst; neither
+has bit timing or arbitration.
 """
 
 from __future__ import annotations

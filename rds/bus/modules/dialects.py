@@ -5,8 +5,9 @@ A dialect is a folder beside this file with two modules that are looked for by t
 `dialect` says what others must know of it: `drivers()`, the class of the host's drivers, which keeps
 `rds.core.contracts.Drivers`; `IDENTIFIERS`, the standard identifiers that it uses, as first, last and what a frame with
 one does to a machine; `answers(machine, interface, channel, **options)`, whether its modules are there, for which
-nothing moves; and, where axes are commanded by other things than voltages, `commands(machine, axes, bus)`. It is read
-for runs that need no bus, so it imports what needs python-can in its functions.
+nothing moves; where axes are commanded by other things than voltages, `commands(machine, axes, bus)`; and what its
+server takes of `rds machine serve` beside the options of a bus, `SERVED_WITH`. It is read for runs that need no bus, so
+it imports what needs python-can in its functions.
 
 `server` has `serve(machine, interface, channel, axes, ready, stop, **options)` and is a program (`server_program.py`).
 """
@@ -76,6 +77,17 @@ def serve_machine(
     """
     check_dialect(dialect)
     import_module(server_module(dialect)).serve(machine, interface, channel, ready=ready, **options)
+
+
+def check_served_with(dialect: str, option: str, value: Any) -> None:
+    """InputError for an option of `rds machine serve` that the modules of this dialect do not have."""
+    if option in getattr(LIBRARY.module(dialect), "SERVED_WITH", ()):
+        return
+    having = [name for name in LIBRARY.names() if option in getattr(LIBRARY.module(name), "SERVED_WITH", ())]
+    raise InputError(
+        f"--{option} {value}: simulated modules of dialect {dialect} do not have it; those of {' and '.join(having)} "
+        "do (--dialect)"
+    )
 
 
 def identifiers(dialect: str) -> tuple[tuple[int, int, str], ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 from rds.core.errors import InputError
 from rds.core.limits import allow_unpacked, lifted, refusal
@@ -33,19 +33,26 @@ _TRC_OTHER = {"ST", "EC", "ER", "EV"}  # status, error counters, error frames, e
 _CSV_HEADING = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 
 
+class Rules(NamedTuple):
+    """Of a text format: what is wrong with a line, and whether it should have given a frame (None: a comment)."""
+
+    check: Callable[[str, int], str | None]
+    is_frame: Callable[[str], bool | None]
+
+
 class Lines:
     """The lines of a text log; what python-can's readers need of a file. `frames` is for whoever gets the frames.
 
     `number` is that of the last line, from 1. Raises InputError, with the file and the line, at a damaged one.
     """
 
-    def __init__(self, file: TextIO, path: str, suffix: str, packed: int = 0):
+    def __init__(self, file: TextIO, path: str, rules: Rules, packed: int = 0):
         self._file = file
         self._packed = packed  # bytes of a compressed file
         self._characters = 0
         self._longest = int(_LONGEST * lifted())
         self._path = path
-        self._check, self._is_frame = _RULES[suffix]
+        self._check, self._is_frame = rules
         self._line = ""
         self.number = 0
         self.frames = 0  # that came of the last line
@@ -154,13 +161,10 @@ def _csv_frame(line: str) -> bool | None:
     return None if line == _CSV_HEADING else True
 
 
-_RULES: dict[str, tuple[Callable[[str, int], str | None], Callable[[str], bool | None]]] = {
-    ".log": (_check_candump, _always),
-    ".csv": (_check_csv, _csv_frame),
-    ".asc": (_anything, _asc_frame),
-    ".trc": (_anything, _trc_frame),
-}
-TEXT = frozenset(_RULES)
+ASC = Rules(_anything, _asc_frame)
+CANDUMP = Rules(_check_candump, _always)
+TRC = Rules(_anything, _trc_frame)
+CSV = Rules(_check_csv, _csv_frame)
 
 
 def _short(line: str) -> str:

@@ -10,11 +10,13 @@ import contextlib
 import gzip
 import os
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol, TextIO, cast
 
 import can
 
+from rds.bus.tools.log_formats import FORMATS, named
 from rds.bus.tools.mf4 import asammdf_missing, bring_asammdf
 from rds.core.private_files import open_private
 
@@ -33,15 +35,13 @@ class Writer(Protocol):
 
 def open_writer(path: Path, ending: str, packed: bool) -> Writer:
     """A writer that begins the file anew. InputError if a package is missing."""
-    if ending == ".blf":
-        return BlfWriter(path)
-    if ending == ".db":
-        return DatabaseWriter(path)
-    if ending == ".mf4":
-        return _Mf4Writer(path)
+    kind = FORMATS[ending]
+    if kind.rules is None:
+        writer: Writer = named(kind.writer)(path)
+        return writer
     how: dict[str, Any] = {"mode": "wt", "encoding": "utf-8", "newline": "\n"}  # the same on every system
     file = cast(TextIO, gzip.open(path, **how) if packed else path.open(**how))  # noqa: SIM115
-    return TextWriter(file, ending, None if packed else path)
+    return TextWriter(file, named(kind.writer), None if packed else path)
 
 
 class CandumpWriter(can.CanutilsLogWriter):
@@ -57,17 +57,14 @@ class CandumpWriter(can.CanutilsLogWriter):
 
 
 class TextWriter:
-    """ASC, candump, TRC and CSV. `path` is where whole lines are the text's own: not where it is compressed."""
+    """A text, written by a class of python-can's or one like it.
 
-    def __init__(self, file: TextIO, ending: str, path: Path | None):
-        kinds: dict[str, Any] = {
-            ".asc": can.ASCWriter,
-            ".log": CandumpWriter,
-            ".trc": can.TRCWriter,
-            ".csv": can.CSVWriter,
-        }
+    `path` is where whole lines are the text's own: not where it is compressed.
+    """
+
+    def __init__(self, file: TextIO, writer: Callable[[TextIO], Any], path: Path | None):
         self._file, self._path = file, path
-        self._writer = kinds[ending](file)
+        self._writer = writer(file)
         self.on_message_received = self._writer.on_message_received
 
     def flush(self) -> None:
@@ -198,7 +195,7 @@ class DatabaseWriter:
             raise OSError(f"the log can't be written: {error}") from error
 
 
-class _Mf4Writer:
+class Mf4Writer:
     """MDF is put together in memory and written at the end."""
 
     def __init__(self, path: Path):

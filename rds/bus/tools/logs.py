@@ -1,21 +1,10 @@
 """Bus logs in python-can's formats: read with every damage named, written with every omission counted.
 
-| ending   | format        | keeps                                         | of a killed recording remains |
-| -------- | ------------- | --------------------------------------------- | ----------------------------- |
-| .asc     | Vector ASCII  | all but FD frames without data                | a readable log                |
-| .blf     | Vector binary | all                                           | a readable log                |
-| .log     | candump -L    | all; of error frames only that there were any | a readable log                |
-| .trc     | PEAK          | classic data frames                           | a readable log                |
-| .csv     | python-can    | all but FD frames                             | a readable log                |
-| .db      | SQLite        | all but FD frames                             | a readable log                |
-| .mf4     | ASAM MDF 4    | all                                           | nothing                       |
-| .asc.gz… | gzip of text  | as the text                                   | what `zcat` can read          |
-
-Read besides, whatever they are called: SavvyCAN's and GVRET's CSV, BusMaster's .log, CRTD (.txt, .crtd) and the .can
-of Microchip's CAN BUS Analyzer (other_logs.py).
+What formats there are, and what each keeps, is in log_formats.py. Read besides, whatever they are called: SavvyCAN's
+and GVRET's CSV, BusMaster's .log, CRTD (.txt, .crtd) and the .can of Microchip's CAN BUS Analyzer (other_logs.py).
 
 It is readable up to the last `flush()`, at most a second before. Times are exact to 1 µs in all; .asc keeps them from
-its first frame on. An error frame of .asc, too, is one and no more.
+its first frame on. Of an error frame, text formats keep that there was one.
 """
 
 from __future__ import annotations
@@ -36,16 +25,13 @@ from can.io.blf import BLFParseError
 from can.util import dlc2len
 
 from rds.bus.tools import log_lock, log_writers
-from rds.bus.tools.log_bombs import check_mf4, check_table
-from rds.bus.tools.log_lines import TEXT, Lines
+from rds.bus.tools.log_formats import ENDINGS, FORMATS, PACKED, READ_ONLY, TEXTS, named
+from rds.bus.tools.log_lines import Lines
 from rds.bus.tools.mf4 import asammdf_missing, bring_asammdf, close_unopened
 from rds.bus.tools.other_logs import LOGGED, UNTIMED, kind_of, read_other
 from rds.core.errors import InputError
 from rds.core.private_files import open_private
 
-_OTHERS = (".txt", ".crtd", ".can")  # read only
-ENDINGS = (".asc", ".blf", ".log", ".trc", ".csv", ".db", ".mf4")
-_READERS = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader, ".csv": can.CSVReader}
 _LOOKED_AT = 1 << 14  # characters
 _FRAME = re.compile(r"(?m)^\s*\(\d+\.\d+\)\s")
 _DAMAGE = (
@@ -67,10 +53,10 @@ def ending(path: Path) -> tuple[str, bool]:
     packed = suffix == ".gz"
     if packed:
         suffix = path.with_suffix("").suffix.lower()
-    if suffix not in ENDINGS or (packed and suffix not in TEXT):
+    if suffix not in ENDINGS or (packed and suffix not in TEXTS):
         raise InputError(
             f"there is no log format {path.suffix if not packed else suffix + '.gz'!r}; "
-            f"end the name in {', '.join(ENDINGS)}, or {', '.join(f'{text}.gz' for text in sorted(TEXT))}",
+            f"end the name in {', '.join(ENDINGS)}, or {', '.join(PACKED)}",
             str(path),
         )
     return suffix, packed
@@ -100,7 +86,7 @@ class LogFile:
     def __init__(self, path: str | Path):
         self.path = path = Path(path)
         self.skipped = self.impossible = 0
-        if path.suffix.lower() in _OTHERS and path.is_file():
+        if path.suffix.lower() in READ_ONLY and path.is_file():
             self._ending, self._packed = path.suffix.lower(), False
         else:
             self._ending, self._packed = ending(path)
@@ -110,7 +96,7 @@ class LogFile:
     def __iter__(self) -> Iterator[can.Message]:
         try:
             self.impossible = 0
-            is_text = self._ending in TEXT or self._ending in _OTHERS
+            is_text = self._ending in TEXTS or self._ending in READ_ONLY
             for message in self._texts() if is_text else self._records():
                 if _is_impossible(message):
                     self.impossible += 1
@@ -125,7 +111,7 @@ class LogFile:
             kind = None if self._packed else kind_of(file)
             if kind == UNTIMED:
                 raise InputError("candump has written no times; record with `candump -L` or `-t a`", f"{self.path}:1")
-            if kind is None and self._ending in _OTHERS:
+            if kind is None and self._ending in READ_ONLY:
                 raise InputError(
                     "it is no log of candump, CRTD or Microchip's CAN BUS Analyzer; is it a log?", str(self.path)
                 )
@@ -140,10 +126,12 @@ class LogFile:
 
     def _lines(self, ending: str) -> Iterator[can.Message]:
         with self._open() as file:
-            lines = Lines(file, str(self.path), ending, self.path.stat().st_size if self._packed else 0)
+            rules = FORMATS[ending].rules
+            assert rules is not None, f"{ending} is no text"
+            lines = Lines(file, str(self.path), rules, self.path.stat().st_size if self._packed else 0)
             found, before = False, -math.inf
             try:
-                reader = _READERS[ending](cast(TextIO, lines))
+                reader = named(FORMATS[ending].reader)(cast(TextIO, lines))
                 for message in reader:
                     lines.frames += 1
                     problem = _problem(message)
@@ -169,14 +157,9 @@ class LogFile:
 
     def _records(self) -> Iterator[can.Message]:
         damage: tuple[type[Exception], ...] = (*_DAMAGE, zlib.error, sqlite3.Error, BLFParseError)
-        if self._ending == ".blf":
-            from rds.bus.tools.blf import check_containers
-
-            check_containers(self.path)
-        elif self._ending == ".db":
-            check_table(self.path)
-        elif self._ending == ".mf4":
-            check_mf4(self.path)
+        if look := FORMATS[self._ending].look:
+            named(look)(self.path)
+        if self._ending == ".mf4":
             bring_asammdf()
             damage = (Exception,)  # asammdf raises whatever its decoder trips over
         number = 0
@@ -266,7 +249,7 @@ class LogWriter:
 
     def write(self, message: can.Message) -> None:
         """Add a frame. A time before the last frame's (a clock that was set back) becomes the last frame's."""
-        kind = self._unkept(message)
+        kind = FORMATS[self._ending].unkept(message)
         if kind is not None:
             self.unkept[kind] += 1
             return
@@ -298,14 +281,3 @@ class LogWriter:
         finally:
             log_lock.release(self._lock)
             self._lock = None
-
-    def _unkept(self, message: can.Message) -> str | None:
-        if message.is_fd and self._ending in (".trc", ".csv", ".db"):
-            return "CAN FD frames"
-        if message.is_fd and self._ending == ".asc" and not message.data:
-            return "CAN FD frames without data"
-        if self._ending == ".trc" and message.is_remote_frame:
-            return "remote frames"
-        if self._ending == ".trc" and message.is_error_frame:
-            return "error frames"
-        return None

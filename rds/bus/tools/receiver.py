@@ -11,6 +11,8 @@ raises, either the receiver goes on or `on_error` was called:
 - the receiving thread itself ends without being asked to: reported, `alive()` is false.
 
 Each report also goes to the log, and nothing that `on_error` raises does any harm.
+
+Our own, because an error of the bus can end python-can's `Notifier` without a word.
 """
 
 from __future__ import annotations

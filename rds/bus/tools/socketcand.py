@@ -15,6 +15,8 @@ first that has not opened the bus.
 A client that does not read is disconnected when `BACKLOG` bytes wait for it; the bus never waits for a client. An
 element that is not understood is answered by an error or, in a `send`, left out with a line in the log, as socketcand
 does.
+
+Our own, because python-can's `socketcand` is a client alone.
 """
 
 from __future__ import annotations

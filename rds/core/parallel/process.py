@@ -2,6 +2,9 @@
 
 It is started fresh and in a session of its own: nothing of this process's state gets into a result, and Ctrl-C reaches
 this process only, which then ends it. It dies with the thread that started it, so that one thread must do all asking.
+
+Our own, because a pool of `concurrent.futures` is broken as a whole when one of its processes dies, as a
+student's code may make it.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ import numpy as np
 
 from rds.bus.modules.rds import frames
 from rds.bus.tools.decode import load_dbc, own_dbc
+from rds.bus.tools.log_formats import TEXTS
 from rds.bus.tools.logs import LogFile
 from rds.core.errors import InputError, MachineError
 from rds.core.limits import UNPACKED, allow
@@ -25,7 +26,6 @@ from rds.identification.logs.table import Column, Table
 Progress = Callable[[int, int], None]
 Signal = tuple[str, str | None, float]
 _LOOK = 1 << 16  # frames between two looks at how much memory they take
-_LINES = (".asc", ".log", ".trc", ".csv")  # formats of lines, uncompressed
 
 
 def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = None) -> Table:
@@ -94,7 +94,7 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
             str(path),
         )
     findings = []
-    if path.suffix.lower() in _LINES and not _ends(path):
+    if path.suffix.lower() in TEXTS and not _ends(path):
         what = "its last line has no end: the recording was cut there, and its last frame may be wrong"
         findings.append(Finding("cut", what, Gravity.WARNING))
     if own is not None:

@@ -1,4 +1,8 @@
-"""Text tables as columns of numbers, read in blocks: ten million rows cost the memory of their numbers."""
+"""Text tables as columns of numbers, read in blocks: ten million rows cost the memory of their numbers.
+
+Our own, because `pandas` reads a layout that it is told; here it is found, and a damaged row is named with its
+line.
+"""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.quantities import Quantity
 
 # what a column can be, beside time
 QUANTITIES = ("command", "position", "velocity", "current", "force", "reference", "following_error")
@@ -93,6 +94,24 @@ class Log:
         if len(self.time) < 2 or not (np.diff(self.time) > 0.0).all():
             raise InputError("a log needs two samples or more, at times that increase", self.name)
 
+    @classmethod
+    def of(cls, data: Any, units: Mapping[str, str], closed_loop: bool | None = None) -> Log:
+        """The log of a data object as nonlinear_benchmarks has them: arrays `u` and `y`, `sampling_time` in s, `name`.
+
+        `units` say what no such object does: those of "command" and "position", as in {"command": "V", "position":
+        "mm"}; a speed has one of `RATES`. InputError where one is missing, or for data of several inputs or outputs.
+        """
+        if missing := [each for each in ("u", "y", "sampling_time") if not hasattr(data, each)]:
+            raise InputError(f"{data!r:.60} has no {missing[0]}; data have u, y and sampling_time")
+        if missing := [each for each in ("command", "position") if each not in units]:
+            raise InputError(f'units has no {missing[0]!r}; give both, as in {{"command": "V", "position": "mm"}}')
+        u, y = (np.squeeze(np.asarray(values, dtype=float)) for values in (data.u, data.y))
+        if u.ndim != 1 or y.ndim != 1:
+            raise InputError(f"u has shape {np.shape(data.u)} and y {np.shape(data.y)}; a log has one of each")
+        step = Quantity("sampling time", "s", above=0.0).check(data.sampling_time, "sampling_time")
+        name = str(getattr(data, "name", None) or "data")
+        return cls(name, np.arange(len(u)) * step, u, y, units=dict(units), closed_loop=closed_loop)
+
     def __len__(self) -> int:
         return len(self.time)
 
@@ -142,5 +161,7 @@ def as_logs(given: Any) -> list[Log]:
     """One log or several as a list. InputError for what is none, such as a file that was not read."""
     logs = list(given) if isinstance(given, Iterable) and not isinstance(given, Log | str | Path) else [given]
     if (other := next((log for log in logs if not isinstance(log, Log)), None)) is not None:
-        raise InputError(f"{other!r:.60} is no log; rds.read_log(FILE) gives those of a file")
+        data = "rds.Log.of(data, units=...) makes one of u and y"
+        said = data if hasattr(other, "u") and hasattr(other, "y") else "rds.read_log(FILE) gives those of a file"
+        raise InputError(f"{other!r:.60} is no log; {said}")
     return logs

@@ -1,4 +1,4 @@
-"""One door to files of logged data, by the ending of their names."""
+"""One door to files of logged data: a format is a row of `FORMATS`, and its endings reach every list of them."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ import hashlib
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from typing import Any, NamedTuple
 
+from rds.bus.tools.log_formats import ENDINGS as BUS_ENDINGS
+from rds.bus.tools.log_formats import READ_ONLY
 from rds.core.errors import InputError
 from rds.identification.logs.table import Table
 
 Progress = Callable[[int, int], None]
 TEXTS = (".csv", ".txt", ".dat", ".tsv", ".prn", ".lvm")
-BUSES = (".asc", ".blf", ".log", ".trc", ".mf4", ".db", ".can", ".crtd")
 MEASUREMENTS = (".mf4", ".mdf", ".dat")  # of which some are text, and some bus logs
 # what of other programs is not read, and which export of theirs is
 _EXPORTS = {
@@ -59,6 +62,106 @@ _OF_BUS = re.compile(
 )
 
 
+class Asked(NamedTuple):
+    """What a map says of a file beside its name, and who hears how far its reading has come."""
+
+    delimiter: str | None = None
+    decimal: str | None = None
+    dbc: Sequence[Path] = ()
+    progress: Progress | None = None
+
+
+class DataFormat(NamedTuple):
+    """A format of logged data. A file is of it by its ending and, where there is `is_one`, by what that says of it."""
+
+    title: str
+    endings: Sequence[str]
+    read: Callable[[Path, Asked], Table]
+    is_one: Callable[[Path, Asked], bool] | None = None
+
+
+def _late(module: str, name: str, *asks: str) -> Callable[[Path, Asked], Any]:
+    """The function `name(path)` of a module beside this one, imported on use; of what was asked it takes `asks`."""
+
+    def call(path: Path, asked: Asked) -> Any:
+        function = getattr(import_module(f"rds.identification.logs.{module}"), name)
+        return function(path, **{each: getattr(asked, each) for each in asks})
+
+    return call
+
+
+def _is_of_frames(path: Path, asked: Asked) -> bool:
+    from rds.bus.tools.logs import is_of_frames
+
+    return bool(asked.dbc) or is_of_frames(path)
+
+
+def _is_of_bus(path: Path, asked: Asked) -> bool:
+    """Whether a text is python-can's CSV, SavvyCAN's and GVRET's, or candump's by another name."""
+    with open(path, "rb") as stream:
+        return _OF_BUS.match(stream.read(60).removeprefix(codecs.BOM_UTF8)) is not None
+
+
+_read_csv = _late("csv_table", "read_csv", "delimiter", "decimal", "progress")
+_read_can = _late("can_table", "read_can", "dbc", "progress")
+
+
+def _read_terminal(path: Path, asked: Asked) -> Table:
+    """What a terminal has saved, which it calls .log as candump does."""
+    try:
+        table: Table = _read_csv(path, asked)
+        return table
+    except InputError as error:
+        what = str(error).removeprefix(f"{error.where}: ")
+        raise InputError(f"{what}; nor is it a log of frames, as `candump -L` writes", error.where) from error
+
+
+def _without_measurements(path: Path, asked: Asked) -> Table:
+    raise InputError("it is no MDF file with measurements; let the name of a bus log end in .mf4")
+
+
+_OF_FRAMES = tuple(each for each in (*BUS_ENDINGS, *READ_ONLY) if each not in TEXTS)
+FORMATS: tuple[DataFormat, ...] = (  # the first that a file is of reads it
+    DataFormat(
+        "measurements in MDF",
+        MEASUREMENTS,
+        _late("mf4_channels", "read_channels"),
+        _late("mf4_channels", "is_measurement"),
+    ),
+    DataFormat(
+        "LinuxCNC's halscope",
+        (*TEXTS, ".log"),
+        _late("halscope_table", "read_halscope"),
+        _late("halscope_table", "is_halscope"),
+    ),
+    DataFormat(
+        "labelled numbers of a serial plotter",
+        (*TEXTS, ".log"),
+        _late("labelled_table", "read_labelled"),
+        _late("labelled_table", "is_labelled"),
+    ),
+    DataFormat(
+        "columns that a terminal has saved",
+        (".log",),
+        _read_terminal,
+        lambda path, asked: not _is_of_frames(path, asked),
+    ),
+    DataFormat("", (".mdf",), _without_measurements),
+    DataFormat("a bus log", (*_OF_FRAMES, ".gz"), _read_can),
+    DataFormat("a bus log", TEXTS, _read_can, _is_of_bus),
+    DataFormat("a trace of CODESYS", TEXTS, _late("codesys_table", "read_trace"), _late("codesys_table", "is_trace")),
+    DataFormat("columns of text", TEXTS, _read_csv),
+    DataFormat("vectors of MATLAB", (".mat",), _late("other_tables", "read_mat")),
+    DataFormat("numeric columns", (".parquet",), _late("other_tables", "read_parquet")),
+)
+
+
+def endings() -> tuple[str, ...]:
+    """The endings of the files that are read: texts, other tables, bus logs."""
+    every = (ending for each in FORMATS for ending in each.endings if ending not in _OF_FRAMES)
+    return tuple(dict.fromkeys((*TEXTS, *every, *_OF_FRAMES)))
+
+
 def read_table(
     path: Path,
     delimiter: str | None = None,
@@ -71,44 +174,14 @@ def read_table(
         raise InputError("it is a folder; name the file of data in it", str(path))
     if not path.is_file():
         raise InputError("there is no such file; check the name and the folder", str(path))
-    from rds.identification.logs import codesys_table, halscope_table, labelled_table, mf4_channels
-
-    ending = path.suffix.lower()
+    ending, asked = path.suffix.lower(), Asked(delimiter, decimal, dbc, progress)
     try:
-        if ending in MEASUREMENTS and mf4_channels.is_measurement(path):
-            table = mf4_channels.read_channels(path)
-        elif ending in (*TEXTS, ".log") and halscope_table.is_halscope(path):
-            table = halscope_table.read_halscope(path)
-        elif ending in (*TEXTS, ".log") and labelled_table.is_labelled(path):
-            table = labelled_table.read_labelled(path)
-        elif ending == ".log" and not dbc and not _is_of_frames(path):
-            from rds.identification.logs.csv_table import read_csv
-
-            try:
-                table = read_csv(path, delimiter, decimal, progress)  # what a terminal has saved
-            except InputError as error:
-                what = str(error).removeprefix(f"{error.where}: ")
-                raise InputError(f"{what}; nor is it a log of frames, as `candump -L` writes", error.where) from error
-        elif ending == ".mdf":
-            raise InputError("it is no MDF file with measurements; let the name of a bus log end in .mf4")
-        elif ending in BUSES or ending == ".gz" or (ending in TEXTS and _is_of_bus(path)):
-            from rds.identification.logs.can_table import read_can
-
-            table = read_can(path, dbc, progress)
-        elif ending in TEXTS and codesys_table.is_trace(path):
-            table = codesys_table.read_trace(path)
-        elif ending in TEXTS:
-            from rds.identification.logs.csv_table import read_csv
-
-            table = read_csv(path, delimiter, decimal, progress)
-        elif ending in (".mat", ".parquet"):
-            from rds.identification.logs import other_tables
-
-            table = other_tables.read_mat(path) if ending == ".mat" else other_tables.read_parquet(path)
-        else:
-            known = ", ".join((*TEXTS, ".mat", ".parquet", *BUSES, ".mdf"))
+        fitting = (each for each in FORMATS if ending in each.endings and (not each.is_one or each.is_one(path, asked)))
+        found = next(fitting, None)
+        if found is None:
             told = f"it is {_EXPORTS[ending]}. Read" if ending in _EXPORTS else "known"
-            raise InputError(f"there is no log of the ending {ending!r}; {told}: {known}")
+            raise InputError(f"there is no log of the ending {ending!r}; {told}: {', '.join(endings())}")
+        table = found.read(path, asked)
         unprintable = next((name for name in table.columns if not name.isprintable()), None)
         if unprintable is not None:  # it would command the terminal that it is shown on
             raise InputError(f"column {unprintable!r} has characters in its name that are no text; rename it")
@@ -119,15 +192,3 @@ def read_table(
     except OSError as error:
         reason = error.strerror or f"{error}; it is cut or damaged: take another copy"
         raise InputError(f"it cannot be read: {reason}", str(path)) from error
-
-
-def _is_of_frames(path: Path) -> bool:
-    from rds.bus.tools.logs import is_of_frames
-
-    return is_of_frames(path)
-
-
-def _is_of_bus(path: Path) -> bool:
-    """Whether a text is python-can's CSV, SavvyCAN's and GVRET's, or candump's by another name."""
-    with open(path, "rb") as stream:
-        return _OF_BUS.match(stream.read(60).removeprefix(codecs.BOM_UTF8)) is not None

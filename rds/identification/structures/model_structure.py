@@ -40,13 +40,13 @@ def _responded(
     """Outputs at the times; NaN from where the model's state or output is no longer finite."""
     state: Sequence[float] = [float(value) for value in x0]
     outputs = np.full(len(t), np.nan)
-    steps = np.diff(t).tolist()
+    times, steps = t.tolist(), np.diff(t).tolist()
     for k, voltage in enumerate(u.tolist()):
-        outputs[k] = model.output(state) if model.output else state[0]
+        outputs[k] = model.seen(state, params, times[k])
         if k == len(steps) or not isfinite(outputs[k]):
             break
         try:
-            state = model.advance(state, voltage, steps[k], params)
+            state = model.moved(state, voltage, steps[k], params, times[k])
         except (OverflowError, ZeroDivisionError):
             break
     return outputs

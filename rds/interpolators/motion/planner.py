@@ -1,4 +1,8 @@
-"""From the segments of a program to samples of all axes, within the limits: `plan`."""
+"""From the segments of a program to samples of all axes, within the limits: `plan`.
+
+Our own, because `ruckig` plans single moves (and does, from point to point), `toppra` knows no limit of jerk, and
+neither rounds corners within a tolerance.
+"""
 
 from __future__ import annotations
 

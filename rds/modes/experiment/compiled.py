@@ -39,6 +39,8 @@ def obstacle(plan: Plan) -> str | None:
         return f"{plan.mode} runs in real time; only simulations can be compiled"
     for axis in plan.axes:
         name = axis.axis.name
+        if axis.following_error is not None:
+            return f"axis {name}: its following error is watched, which may end the run"
         if axis.command is not Command.VOLTAGE:
             return f"axis {name}: its drive closes a loop of its own"
         if axis.model.motion is not LinearAxisMotion:

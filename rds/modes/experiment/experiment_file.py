@@ -15,10 +15,11 @@ from rds.core.shared_quantities import DURATION, SAMPLE_PERIOD
 from rds.models import model_module, model_names
 from rds.modes import mode_names
 from rds.modes.experiment.compensation import COMPENSATION
+from rds.modes.loop.following_error import FOLLOWING_ERROR
 from rds.network.network_file import NETWORK
 from rds.references import signal_kinds, signal_options
 
-AXIS_KEYS = ("reference", "signal", "controller", "model", "error_compensation")
+AXIS_KEYS = ("reference", "signal", "controller", "model", "error_compensation", "following_error")
 PATHS = Registry("reference", {"path": "rds.nc.run.path"})
 """Kinds of references that drive all axes of a run together. Each module gives `WORDS` (the table's keys),
 `program(words, folder, machine, axes, T)`, `judged_path(result, program, T)`, and
@@ -86,6 +87,7 @@ _OF_AN_AXIS: Mapping[str, Declaration] = {
     "signal": AnyValue("voltage that drives the axis without a controller, V", (SIGNAL,)),
     "controller": AnyValue("the law that answers with a voltage", (_CONTROLLER, _NAME_OR_FILE)),
     "error_compensation": COMPENSATION,
+    "following_error": FOLLOWING_ERROR,
     "model": AnyValue("what stands for the axis in simulation; by default the machine's own", (_MODEL, _NAME_OR_FILE)),
 }
 INTERFACE = Table(

@@ -66,13 +66,13 @@ def lsim(
     output = np.empty(len(times))
     for k, u in enumerate(voltage):
         states[k] = state
-        output[k] = model.output(state) if model.output else state[0]
+        output[k] = model.seen(state, numbers, times[k])
         if not np.all(np.isfinite(states[k])):
             raise ContractError(
                 f"the model's state is {list(state)} at t = {times[k]:g} s; check its equations and units"
             )
         if k + 1 < len(times):
-            state = model.advance(state, float(u), period, numbers)
+            state = model.moved(state, float(u), period, numbers, times[k])
     return times, output, states
 
 

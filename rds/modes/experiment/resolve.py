@@ -29,6 +29,7 @@ from rds.modes.experiment.drives import (
 from rds.modes.experiment.experiment_file import AXIS_KEYS, PATHS, is_path
 from rds.modes.experiment.parts import Setting, make_controller, make_drive, make_model, named
 from rds.modes.loop.commands import Command
+from rds.modes.loop.following_error import Allowed
 from rds.modes.loop.laws import ReferenceSamples
 from rds.modes.loop.mode import Mode
 from rds.modes.loop.plan import AxisPlan, Plan
@@ -239,9 +240,10 @@ def _axis_plan(
         controller, note = giving_way(axis, command, controller)
     if (table := words.inner("error_compensation")) is not None:
         controller = _compensated(table, setting, controller)
+    watched = _following_error(words, setting, driven)
     most = setting.limit if command is Command.VELOCITY else inf
     if driven == "program":
-        plan = AxisPlan(axis, model, controller, command=command, most_target=most)
+        plan = AxisPlan(axis, model, controller, command=command, most_target=most, following_error=watched)
     elif driven == "signal":
         if "signal" not in words:
             raise InputError(f"axis {axis.name} has no [signal]{words.slip('signal')}", words.place())
@@ -256,7 +258,7 @@ def _axis_plan(
         _check_travel(samples_of, axis, words)
         with named(words.table_of("reference", {})):
             check_reference(samples_of, axis, command, setting.top_speed, setting.T)
-        plan = AxisPlan(axis, model, controller, samples_of, command=command, most_target=most)
+        plan = AxisPlan(axis, model, controller, samples_of, command=command, most_target=most, following_error=watched)
         period = reference.period
     if words.name:
         words.done()
@@ -278,6 +280,23 @@ def _compensated(table: TomlTable, setting: Setting, controller: Controller | No
     if setting.command is Command.PROFILE or axis.is_spindle:
         return controller
     return compensated(controller, setting.T, time, most, axis.unit)
+
+
+def _following_error(words: TomlTable, setting: Setting, driven: str) -> Allowed | None:
+    """How far the axis may be from its reference; a spindle, whose speed rises as it can, is not watched."""
+    if (table := words.inner("following_error")) is None:
+        return None
+    ferror = table.read("ferror")
+    at_rest = table.read("min_ferror", ferror)
+    if at_rest > ferror:
+        raise table.fault("min_ferror", f"must be at most ferror, {ferror:g}: the error that is allowed at full speed")
+    table.done()
+    if driven == "signal":
+        raise InputError("[signal] drives the axis without a reference, so there is no following error", table.place())
+    if setting.axis.is_spindle:
+        return None
+    limits = setting.axis.limits
+    return Allowed(at_rest, ferror, setting.top_speed if limits is None else limits.velocity)
 
 
 def _program(words: TomlTable, mode: Mode) -> str:

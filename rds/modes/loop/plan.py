@@ -13,12 +13,13 @@ from typing import Any
 from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
 from rds.core.portable import portable
-from rds.core.types import Controller, Model
+from rds.core.types import Controller, Ending, Model
 from rds.machines import Axis, Machine
 from rds.machines.converter import converter
 from rds.modes.loop.changes import LiveChanges, plan_changes, stop_channel
 from rds.modes.loop.commands import Command, limiter
 from rds.modes.loop.execution import Execution, Follower
+from rds.modes.loop.following_error import Allowed, FollowingGuard, Watched
 from rds.modes.loop.force_guard import Cell
 from rds.modes.loop.interpolated import Interpolated
 from rds.modes.loop.laws import LiveReference, ReferenceSamples, controlled, coupled, played
@@ -46,6 +47,7 @@ class AxisPlan:
     signal: Sequence[float] | None = None  # V at every sample
     command: Command = Command.VOLTAGE
     most_target: float = inf  # in the command's unit
+    following_error: Allowed | None = None
 
     @property
     def acting(self) -> str:
@@ -131,10 +133,12 @@ class Plan:
         tunings = self._tunings()
         actions = {name: act for tuning in tunings for name, act in tuning.actions().items()}
         params = [tuning.params for tuning in tunings]
-        program = self.program
+        program, guard = self.program, self._guard()
+        last = [] if guard is None else [guard.law]
         if program is None:
             references = [plan.reference for plan in self.axes if plan.reference is not None]
-            return Drive(self._laws(params, references), LiveChanges(self.channels(), actions, self.changes))
+            changes = LiveChanges(self.channels(), actions, self.changes, None if guard is None else guard.over)
+            return Drive([*self._laws(params, references), *last], changes)
         live = {name: LiveReference() for name in self.names}
         spindle = None if program.spindle is None else self.names.index(program.spindle)
         follower: Follower = (
@@ -150,10 +154,24 @@ class Plan:
             lambda names: changes.expects(names),
             cell,
         )
-        changes = LiveChanges(
-            self.channels(), actions | execution.actions(), self.changes, execution.over, execution.waits
-        )
-        return Drive([execution.law, *self._laws(params, list(live.values()))], changes, sets_references=True)
+
+        def ends() -> tuple[Ending, str] | None:
+            return (guard.over() if guard is not None else None) or execution.over()
+
+        changes = LiveChanges(self.channels(), actions | execution.actions(), self.changes, ends, execution.waits)
+        return Drive([execution.law, *self._laws(params, list(live.values())), *last], changes, sets_references=True)
+
+    def _guard(self) -> FollowingGuard | None:
+        """What ends the run where an axis is too far from its reference."""
+        if all(plan.following_error is None for plan in self.axes):
+            return None
+        columns, _ = self.columns(None)
+        watched = [
+            Watched(plan.axis.name, plan.axis.unit, allowed, columns.index(f"{plan.axis.name}_reference"))
+            for plan in self.axes
+            if (allowed := plan.following_error) is not None
+        ]
+        return FollowingGuard(watched, [i for i, p in enumerate(self.axes) if p.command is Command.VOLTAGE], self.T)
 
     def _groups(self) -> list[list[int]]:
         """The axes under one law, in axis order: those of a coupled controller together, every other one alone."""

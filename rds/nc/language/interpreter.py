@@ -1,4 +1,8 @@
-"""From the text of a part program to its canonical calls: block after block, in LinuxCNC's order of execution."""
+"""From the text of a part program to its canonical calls: block after block, in LinuxCNC's order of execution.
+
+Our own, because LinuxCNC's `rs274` comes with LinuxCNC alone, and `gcodeparser` and `pygcode` read words but
+execute no loops, cycles and compensation.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""DXF drawings (ASCII): lines, arcs, circles, polylines with bulges, ellipses, splines, points, and blocks."""
+"""DXF drawings (ASCII): lines, arcs, circles, polylines with bulges, ellipses, splines, points, and blocks.
+
+Our own, because `ezdxf` reads whole documents; here curves on layers are wanted, and what a drawing from
+elsewhere may cost is limited as it is read.
+"""
 
 from __future__ import annotations
 

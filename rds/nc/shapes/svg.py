@@ -1,4 +1,7 @@
-"""SVG drawings: paths and shapes with their transforms, layers and units, in mm with Y upwards."""
+"""SVG drawings: paths and shapes with their transforms, layers and units, in mm with Y upwards.
+
+Our own, because `svgpathtools` gives paths; a part needs their units and layers, and what is hidden left out.
+"""
 
 from __future__ import annotations
 

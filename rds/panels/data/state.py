@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
 from rds.identification.fit.fit import METHODS
-from rds.identification.logs.tables import TEXTS
+from rds.identification.logs.tables import endings
 from rds.identification.structures import SIMULATION_ERROR
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Several, Text, labels
@@ -39,7 +39,6 @@ OPTIONS = {
     "backlash": "backlash",
 }
 LISTED = 200  # runs, the latest; others are named by hand
-SUFFIXES = (*TEXTS, ".mat", ".parquet", ".asc", ".blf", ".trc", ".log", ".mf4", ".mdf")
 
 
 @dataclass
@@ -59,7 +58,7 @@ class DataState:
     def files(self) -> list[str]:
         """Files of the folder that may hold logged data, and its latest runs, by their way from the folder."""
         folder = self.session.folder
-        found = [path for path in _entries(folder) if path.suffix.lower() in SUFFIXES and _may_be_log(path)]
+        found = [path for path in _entries(folder) if path.suffix.lower() in endings() and _may_be_log(path)]
         runs = [run.folder for run in self.session.runs(LISTED)]
         return [str(path.relative_to(folder)) for path in [*found, *runs]]
 

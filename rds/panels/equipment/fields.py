@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rds.controllers import controller_module, controller_names
+from rds.controllers import controller_module, controller_names, is_for_spindle
 from rds.controllers.tracking import OBSERVER_POLE, POLES
 from rds.core.quantities import Declaration, Quantity
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.machines import Axis, Machine
+from rds.modes.loop.following_error import LARGEST
 from rds.modes.loop.mode import Drive
 from rds.panels.interpolator.motion import motion_fields
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text, field_of, labels, mode_choice
@@ -23,6 +24,7 @@ USER = "user"  # the choice of something that the student wrote
 PREFIX = "controller."  # of the fields of a controller's parameters
 OF_MODEL = "model."  # of those of a student's model
 SPINDLE = "rev/min"
+FERROR = "ferror"  # the field of the largest following error
 DRIVEN_BY: dict[str, Drive] = {"model": "signal", "control": "controller"}  # what drives the axes, by panel
 SIZES = ("amplitude", "frequency", "offset")  # of a signal: fields that most kinds share
 OF_SIGNAL = "signal."  # prefix of the fields of what else a kind of signal needs
@@ -38,7 +40,6 @@ _CONTROLLERS = {
     "lqg": "LQG",
     "smith": "Smith predictor",
 }
-OF_POSITION = ("tracking", "feedforward", "zero-phase", "cascade", "lqg", "smith")  # not offered for a spindle
 MODELS = {"default": "Default", USER: "User-defined"}
 POLE, POLE_OFFSET, OBSERVER = f"{PREFIX}pole", f"{PREFIX}pole_imaginary", f"{PREFIX}observer_pole"
 _COMMENT = 40  # characters of a file's comment that stand beside a field
@@ -89,6 +90,16 @@ def first_fields(kind: str, machine: Machine, kept: object = None) -> Iterable[F
         yield Flag("coupled", "One controller for all axes", tip, False)
     yield Number("duration", "Final time", "how long it runs", 10.0, unit="s", above=0.0, high=3600.0)
     yield Number.of(SAMPLE_PERIOD, "sample_period", "Sample period", machine.sample_period)
+    if kind == "control":
+        yield Number.of(
+            LARGEST,
+            FERROR,
+            "Largest following error",
+            tooltip="how far the axis may be from its reference before the run ends, at its largest velocity and below",
+            unit=axis.unit if axis.unit != SPINDLE else "mm",
+            optional=True,
+            when_empty="not watched",
+        )
 
 
 def axes_of(system: str) -> list[str]:
@@ -128,8 +139,8 @@ def _path_fields() -> Iterable[Field]:
 
 
 def controllers(axis: Axis) -> Choice:
-    """The controllers that an axis can have: a spindle has nothing to observe, and no position loop."""
-    fitting = [name for name in controller_names() if axis.unit != SPINDLE or name not in OF_POSITION]
+    """The controllers that an axis can have: a spindle has nothing to observe."""
+    fitting = [name for name in controller_names() if axis.unit != SPINDLE or is_for_spindle(name)]
     first = "tracking" if "tracking" in fitting else "pid"
     options = labels(fitting, _CONTROLLERS) | {USER: "User-defined"}
     return Choice("controller", "Controller", "the law that answers with a voltage", first, options)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ipywidgets as widgets
 
-from rds.panels.equipment.fields import PREFIX, SIZES
+from rds.panels.equipment.fields import FERROR, PREFIX, SIZES
 from rds.panels.equipment.parameters import Folded, Parameters, box_of_fields, count_changed, fill
 from rds.panels.equipment.state import Equipment
 from rds.panels.interpolator.motion import MADE
@@ -16,7 +16,7 @@ _GROUPS = (
     ("interpolator", "interpolator_file", *MADE),
     ("controller", "controller_file", "coupled"),
     ("model", "model_file"),
-    ("duration", "sample_period"),
+    ("duration", "sample_period", FERROR),
 )
 _BUTTONS = ("model",)  # choices shown as buttons; the others are lists
 

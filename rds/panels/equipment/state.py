@@ -20,12 +20,14 @@ from rds.panels.code.versions import keep_file
 from rds.panels.equipment.build import Builds, Checked
 from rds.panels.equipment.fields import (
     CIRCLE,
+    FERROR,
     OF_MODEL,
     OF_SIGNAL,
     PATH,
     POLE,
     PREFIX,
     SIZES,
+    SPINDLE,
     USER,
     axes_of,
     controllers,
@@ -118,6 +120,8 @@ class Equipment:
         idle |= {"radius", "feed", "laps"} if chosen["shape"] != CIRCLE else {"path_file"}
         if len(self.axes) == 1 or chosen["controller"] != USER:
             idle.add("coupled")
+        if self.axis.unit == SPINDLE:
+            idle.add(FERROR)
         if not load_mode(str(chosen["mode"])).modelled:  # the machine alone
             idle |= {"model", "model_file"}
         return [name for name in chosen.fields if name not in idle]
@@ -127,7 +131,8 @@ class Equipment:
         for name, value in FIRST_SINE.items():
             if name in self.choices and _option(self.choices.fields[name], value):
                 self.choices.set(name, value)
-        for name in (*SIZES, "duration", "sample_period", *self.parameters):
+        watched = (FERROR,) if FERROR in self.choices else ()
+        for name in (*SIZES, "duration", "sample_period", *watched, *self.parameters):
             self.choices.set(name, self.choices.fields[name].default)
 
     def own_controller(self) -> None:
@@ -148,6 +153,8 @@ class Equipment:
         }
         if self.kind == "control":
             table["controller"] = self._controller()
+            if FERROR in self.shown and chosen[FERROR] is not None:
+                table["following_error"] = {FERROR: chosen[FERROR]}
         if "model_file" in self.shown:
             table["model"] = self._own("model_file", "model", self.model_parameters)
         if self.session.bus:

@@ -1,4 +1,8 @@
-"""The machine in motion as a widget: what it looks like goes to the page once, rows of a run as they come."""
+"""The machine in motion as a widget: what it looks like goes to the page once, rows of a run as they come.
+
+Our own, because `k3d`, which draws the paths of programs, is moved from the kernel; here the browser moves the
+machine by itself, however busy the kernel is.
+"""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 speed, flatness; return error, rapids and path error of part programs.
 
 One door: a kind of report, data files and options in; tables, pictures and findings out. Light to import: matplotlib
-and python-can are imported by what needs them.
+and python-can are imported by what needs them. A module of a kind has `SETTINGS`, its options by name (`Setting`),
+and `report(files, settings) -> Report` (content.py).
 """
 
 from __future__ import annotations

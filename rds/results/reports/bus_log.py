@@ -15,7 +15,9 @@ _EXAMPLE = "'time_s,id,data', then '0.0012,001,0100000000000000'"
 
 def is_log(path: Path) -> bool:
     """Whether the file's ending is one of a bus log of python-can's other than CSV."""
-    return path.suffix.lower() in {".asc", ".blf", ".log", ".trc", ".mf4", ".db", ".gz"}
+    from rds.bus.tools.log_formats import ENDINGS
+
+    return path.suffix.lower() in {*ENDINGS, ".gz"} - {".csv"}
 
 
 def read_frames(path: Path) -> list[Frame]:
@@ -32,9 +34,11 @@ def read_frames(path: Path) -> list[Frame]:
     else:
         frames = list(_log(path))
     if not frames:
+        from rds.bus.tools.log_formats import ENDINGS
+
         raise InputError(
             "it has no data frames; record the bus while requests are answered, and keep the log's ending "
-            "(.asc, .blf, .log for candump, .trc, .csv)",
+            f"({', '.join(ENDINGS)})",
             str(path),
         )
     return frames

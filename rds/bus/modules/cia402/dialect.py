@@ -9,7 +9,8 @@ from rds.bus.modules.cia402.codes import IDENTIFIERS
 from rds.core.contracts import Drivers
 from rds.machines.machine import Machine
 
-__all__ = ["IDENTIFIERS", "answers", "commands", "drivers"]
+__all__ = ["IDENTIFIERS", "SERVED_WITH", "answers", "commands", "drivers"]
+SERVED_WITH = ("quirks", "eds")
 
 
 def drivers() -> type[Drivers]:

@@ -2,6 +2,9 @@
 
 Every verb takes an instant of bus time in s and returns the frames to send, as (identifier, data). However late the
 drive learns of a frame, its axis, its deadlines and its faults keep the instants of the frames' time stamps.
+
+Our own, because canopen's `LocalNode` answers SDO, but has no states of CiA 402 and sends no process data on
+SYNC.
 """
 
 from __future__ import annotations

@@ -9,7 +9,8 @@ from rds.bus.modules.dcs.frames import IDENTIFIERS
 from rds.core.contracts import Drivers
 from rds.machines.machine import Machine
 
-__all__ = ["IDENTIFIERS", "answers", "drivers"]
+__all__ = ["IDENTIFIERS", "SERVED_WITH", "answers", "drivers"]
+SERVED_WITH = ("drift",)
 
 
 def drivers() -> type[Drivers]:

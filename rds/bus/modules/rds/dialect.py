@@ -8,7 +8,8 @@ from rds.bus.modules.rds.frames import IDENTIFIERS
 from rds.core.contracts import Drivers
 from rds.machines.machine import Machine
 
-__all__ = ["IDENTIFIERS", "answers", "drivers"]
+__all__ = ["IDENTIFIERS", "SERVED_WITH", "answers", "drivers"]
+SERVED_WITH = ("drift", "cut")
 
 
 def drivers() -> type[Drivers]:
