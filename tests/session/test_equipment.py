@@ -45,8 +45,9 @@ def test_the_first_sine_is_a_sine_on_x_whatever_was_chosen(tmp_path: Path) -> No
 def test_a_spindle_is_not_offered_what_it_cannot_have(tmp_path: Path) -> None:
     equipment = Equipment(Session(tmp_path), "control")
     choose(equipment, system="spindle")
-    assert "tracking" not in equipment.choices.fields["controller"].options
-    assert equipment.table()["controller"] == {"name": "pid"}
+    assert "feedforward" not in equipment.choices.fields["controller"].options
+    assert equipment.parameters == ["controller.speed_pole"]
+    assert equipment.table()["controller"] == {"name": "tracking", "speed_pole": -32.0}
     assert equipment.choices.fields["amplitude"].unit == "rev/min"
     choose(equipment, system="X", controller="tracking")
     assert equipment.parameters == ["controller.pole", "controller.pole_imaginary", "controller.observer_pole"]

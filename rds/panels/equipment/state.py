@@ -22,6 +22,7 @@ from rds.panels.equipment.fields import (
     CIRCLE,
     OF_MODEL,
     OF_SIGNAL,
+    OF_SPINDLE,
     PATH,
     POLE,
     PREFIX,
@@ -255,7 +256,7 @@ class Equipment:
         if chosen["controller"] == USER:
             own = self._own("controller_file", "controller", self.parameters)
             return own | ({"coupled": True} if self.coupled else {})
-        if POLE in chosen:
+        if POLE in chosen or OF_SPINDLE in chosen:
             return {"name": chosen["controller"]} | tracking_options(chosen.values())
         given = {name.removeprefix(PREFIX): value_of(chosen.fields[name], chosen[name]) for name in self.parameters}
         return {"name": chosen["controller"]} | {name: value for name, value in given.items() if value is not None}
