@@ -84,10 +84,16 @@ def test_the_block_diagram_has_what_takes_lines_and_arcs(tmp_path: Path) -> None
     view = opened(tmp_path, kind="both", given="several", arc_method="tustin", acceleration="s-shape")
     assert not svg(view)
     press(view, "View model")
-    for said in ("Executive", "Linear interpolator", "Circular interpolator", "tustin", "2 segments", "s-shape"):
+    for said in (
+        "Executive (hands out",
+        "Linear (interpolator, constant-velocity",
+        "Circular (interpolator, tustin",
+        "2 segments",
+        "s-shape",
+    ):
         assert said in svg(view)
     view.work.choices.set("kind", "circular")
-    assert "Circular interpolator" in svg(view) and "Linear interpolator" not in svg(view)
+    assert "Circular" in svg(view) and "Linear" not in svg(view)
     view.work.choices.set("arc_method", "user")
     assert not svg(view) and "name the file of your interpolator for arcs" in view.model.value
     view.work.choices.set("arc_file", "mine.py")

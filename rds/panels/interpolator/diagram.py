@@ -7,7 +7,7 @@ from rds.panels.equipment.diagram import Block, Diagram, Link
 from rds.panels.interpolator.fields import ARC, BUNDLED, LINE, NONE, PROGRAM, SINGLE, USER
 from rds.panels.interpolator.state import Interpolating
 
-_TITLES = {LINE: "Linear interpolator", ARC: "Circular interpolator"}
+_TITLES = {LINE: "Linear", ARC: "Circular"}
 
 
 def diagram(work: Interpolating) -> Diagram:
@@ -15,8 +15,11 @@ def diagram(work: Interpolating) -> Diagram:
     path = Block("path", "Path", _path(work), 0)
     executive = Block("executive", "Executive", ("hands out segment", "after segment"), 1)
     blocks, links = [path, executive], [Link("path", "executive", "")]
-    takes = [Block(role, _TITLES[role], _method(work, role), 2, row) for row, role in enumerate(work.roles)]
-    last = Block("samples", "Samples", ("position, velocity,", "acceleration", f"every {_period(work):g} ms"), 3)
+    takes = [
+        Block(role, _TITLES[role], ("interpolator", *_method(work, role)), 2, row)
+        for row, role in enumerate(work.roles)
+    ]
+    last = Block("samples", "Samples", ("position, velocity", "and acceleration", f"every {_period(work):g} ms"), 3)
     if work.choices["acceleration"] != NONE:
         seconds = f"{work.choices['acceleration_time']:g} s"
         at_ends = ("rests after each",) if work.choices["exact_stop"] else ()
