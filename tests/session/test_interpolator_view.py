@@ -125,7 +125,9 @@ def test_the_samples_go_by_e_mail_as_they_are_saved(box: tuple[Box, Any], tmp_pa
     message = email.message_from_bytes(handler.mails[1].content, policy=default)
     (part,) = message.iter_attachments()
     assert part.get_filename() == "arc.csv"
-    text = part.get_payload(decode=True).decode().replace("\r\n", "\n")
+    data = part.get_payload(decode=True)
+    assert isinstance(data, bytes)
+    text = data.decode().replace("\r\n", "\n")
     assert text == (tmp_path / "arc.csv").read_text() and "X_reference_acceleration" in text
     view.work.choices.set("feed", 300.0)
     ready(view)
