@@ -97,6 +97,7 @@ def test_parameters_are_those_of_the_library_with_their_units(tmp_path: Path) ->
         ("control", {}),
         ("control", {"controller": "pid", "controller__Pgain": 12.5, "system": "Y", "shape": "triangle"}),
         ("control", {"controller": "tracking", "controller__pole": -20.0, "controller__pole_imaginary": 0.0}),
+        ("control", {"system": "spindle", "controller": "tracking", "controller__speed_pole": -50.0}),
         ("control", {"controller": "user", "controller_file": "mine.py", "offset": 1.0}),
         ("control", {"shape": "user", "shape_file": "2*sin(t)+t"}),
         ("control", {"shape": "chirp", "signal__highest": 5.0, "controller": "smith", "controller__law": "p"}),
