@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from rds.nc.setup import Setup
     from rds.results import Result
 
+_LINEAR = ("X", "Y", "Z")
+_CHORDS = 20  # for each rad of an arc that is drawn
 MOST = 2_000_000  # samples, which are held in memory
 
 
@@ -41,7 +43,7 @@ def follow(
         blocks = _gathered(samples, T)
     axes = [k for k in range(6) if limits.present[k]]
     result = _result(blocks, axes, T, {"profile": profile, "certificate": certificate.to_dict()})
-    files = _save(result, certificate, folder, plot) if folder is not None else []
+    files = _save(result, certificate, blocks, folder, plot) if folder is not None else []
     resting = _resting(blocks)
     about = {
         "profile": profile,
@@ -104,12 +106,15 @@ def _result(blocks: list[SampleBlock], axes: list[int], T: float, about: dict[st
     return Result(columns, units, {"axes": names, "sample_period": T, "mode": "interpolation", "interpolation": about})
 
 
-def _save(result: Result, certificate: Certificate, folder: Path, plot: bool) -> list[Path]:
+def _save(result: Result, certificate: Certificate, blocks: list[SampleBlock], folder: Path, plot: bool) -> list[Path]:
     from rds.core.atomic import write_files
 
     files = [result.save(folder / "interpolation.csv")]
     if plot:
-        drawn: dict[str, Picture] = {"motion": _motion(result), "certificate": certificate.plot()}
+        drawn: dict[str, Picture] = {"motion": _motion(result), "feed": _feed(result, blocks)}
+        if sum(axis in _LINEAR for axis in result.meta["axes"]) > 1:
+            drawn["path"] = _path(result, blocks)
+        drawn["certificate"] = certificate.plot()
         pictures = {folder / f"{name}.png": picture.png() for name, picture in drawn.items()}
         write_files({path: partial(_write, png) for path, png in pictures.items()})
         files += pictures
@@ -128,6 +133,48 @@ def _motion(result: Result) -> Picture:
     kinds = ("reference", "reference_velocity", "reference_acceleration")
     columns = [np.column_stack([result[f"{axis}_{kind}"] for axis in names]) for kind in kinds]
     return over_time(result["time"], names, *columns)
+
+
+def _feed(result: Result, blocks: list[SampleBlock]) -> Picture:
+    """The speed along the path over time, mm/s (degrees/s where no linear axis moves), beside the programmed one."""
+    from rds.interpolators.plots import speed
+
+    velocity = np.concatenate([block.velocity for block in blocks])
+    of = slice(0, 3) if velocity[:, :3].any() else slice(3, 6)
+    programmed = np.concatenate([_programmed_speed(block) for block in blocks])
+    unit = "mm/s" if of.start == 0 else "degrees/s"
+    return speed(result["time"], programmed, np.linalg.norm(velocity[:, of], axis=1), unit)
+
+
+def _programmed_speed(block: SampleBlock) -> np.ndarray:
+    """The feed rate of each sample's segment; nan in a rapid, and where the program has not moved yet."""
+    number = block.segment - block.path_first
+    known = (number >= 0) & (number < len(block.path))
+    if not known.any():
+        return np.full(len(block), np.nan)
+    segments = block.path[np.where(known, number, 0)]
+    return np.where(known & ~segments["rapid"], segments["rate"], np.nan)
+
+
+def _path(result: Result, blocks: list[SampleBlock]) -> Picture:
+    """The programmed path and the samples, in each plane of two linear axes in which they go somewhere."""
+    from rds.interpolators.motion.segments import AXES, LINE, point_at
+    from rds.interpolators.plots import in_planes
+
+    points, done = [], -1
+    for block in blocks:
+        for number, segment in enumerate(block.path, block.path_first):
+            if number <= done:
+                continue
+            done, length = number, float(segment["length"])
+            count = 1 if segment["plane"] == LINE else 2 + int(abs(float(segment["sweep"])) * _CHORDS)
+            points += [point_at(segment, length * k / count) for k in range(count + 1)]
+    names = [axis for axis in result.meta["axes"] if axis in _LINEAR]
+    columns = [AXES.index(name) for name in names]
+    position = np.column_stack([result[f"{name}_reference"] for name in names])
+    programmed = np.array(points)[:, columns] if points else position[:1]
+    going = [k for k in range(len(names)) if np.ptp(position[:, k]) > 0.0]
+    return in_planes(names, going, programmed, position)
 
 
 def _show(file: Path, about: dict[str, Any], certificate: Certificate, files: list[Path]) -> None:

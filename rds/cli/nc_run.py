@@ -58,6 +58,9 @@ def run(
         str | None,
         typer.Option(help="Make the samples in the loop: a method of the library, or your .py with interpolate()."),
     ] = None,
+    arc_interpolator: Annotated[
+        str | None, typer.Option(help="Another one for arcs, with its default options; --interpolator takes the lines.")
+    ] = None,
     option: Annotated[
         list[str] | None,
         typer.Option(
@@ -129,6 +132,7 @@ def run(
                 "--override": override != 100.0,
                 "--controller": controller,
                 "--interpolator": interpolator,
+                "--arc-interpolator": arc_interpolator,
                 "--acceleration": acceleration,
                 "--acceleration-time": acceleration_time,
                 "--exact-stop": exact_stop,
@@ -183,7 +187,7 @@ def run(
                 machine,
                 setup=setup(tools, parameters, with_, max_jumps),
                 controller=None if experiment is not None else controller,
-                interpolator=_interpolator(interpolator, option, look_ahead),
+                interpolator=_interpolator(interpolator, arc_interpolator, option, look_ahead),
                 acceleration=acceleration_of(acceleration, acceleration_time, None, exact_stop),
                 exact_stop=exact_stop,
                 profile=profile,
@@ -225,17 +229,20 @@ def run(
     raise typer.Exit(exit_code(result))
 
 
-def _interpolator(name: str | None, options: list[str] | None, look_ahead: int | None) -> dict[str, Any] | None:
+def _interpolator(
+    name: str | None, arcs: str | None, options: list[str] | None, look_ahead: int | None
+) -> dict[str, Any] | None:
     """The words of an interpolator; InputError for those that go with one which is not given."""
     from rds.cli.interpolate import option_of
     from rds.core.errors import InputError
 
     if name is None:
-        for key, given in (("--option", options), ("--look-ahead", look_ahead)):
+        for key, given in (("--arc-interpolator", arcs), ("--option", options), ("--look-ahead", look_ahead)):
             if given is not None and given != []:
                 raise InputError(f"{key} goes with --interpolator, which is not given; add --interpolator tustin")
         return None
     words: dict[str, Any] = {"interpolator": name, "params": dict(map(option_of, options or ()))}
+    words |= {} if arcs is None else {"arc_interpolator": arcs}
     return words if look_ahead is None else words | {"look_ahead": look_ahead}
 
 

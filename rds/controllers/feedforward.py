@@ -36,7 +36,7 @@ COMPENSATION = {
     "backlash": Quantity("play between motor and encoder, its whole width", "mm", low=0.0),
     "backlash_time": Quantity("time constant of crossing the play", "s", above=0.0),
 }
-OPTIONS: Mapping[str, Declaration] = {**tracking.OPTIONS, **COMPENSATION}
+OPTIONS: Mapping[str, Declaration] = {**tracking.OF_POSITION, **COMPENSATION}
 BACKLASH_TIME = 0.005  # s; chosen: half of the mini CNC's τ
 TUNABLE = tracking.TUNABLE | COMPENSATION
 
@@ -92,9 +92,9 @@ def make(
     if unit == SPINDLE_UNIT:
         raise InputError(
             f"{owner} drives position axes: a spindle (unit {unit!r}) has no play to cross and its speed is measured; "
-            f"use 'p', 'pid' or 'modified-pid'"
+            f"use 'tracking', 'p', 'pid' or 'modified-pid'"
         )
-    design = {name: value for name, value in options.items() if name in tracking.OPTIONS}
+    design = {name: value for name, value in options.items() if name in tracking.OF_POSITION}
     base = tracking.make(axis_model, T, converter_range, unit=unit, **design)
     friction = {name: axis_model.get(name, 0.0) for name in ("friction_plus", "friction_minus")}
     given = friction | {"backlash": 0.0, "backlash_time": BACKLASH_TIME} | options

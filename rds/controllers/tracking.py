@@ -4,6 +4,7 @@
 
 with v̂ from the observer of `rds.controllers.observer`, which is fed the voltage after saturation: what the
 axis really gets. Friction is not in the law. In steady motion it leaves an error of (F_C/τ)(1 + g₂/|pole|)/g₁.
+A spindle, whose speed is measured, has the same law with one state and no observer: `rds.controllers.speed_tracking`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from rds.controllers import observer
+from rds.controllers import observer, speed_tracking
 from rds.controllers.axis_data import SPINDLE_UNIT, AxisData, axis_data
 from rds.core.errors import InputError
 from rds.core.options import check_known
@@ -20,14 +21,15 @@ from rds.core.quantities import AnyValue, Declaration, Items, Quantity
 from rds.core.types import Controller, Reference, Source
 
 NAME = "tracking"
-SPINDLE = False
 _REAL = Quantity("real pole", "1/s")
 _PAIR = Items("pole", Quantity("real or imaginary part", "1/s"), "[real, imaginary]", 2)
-OPTIONS: Mapping[str, Declaration] = {
+OF_POSITION: Mapping[str, Declaration] = {
     "poles": Items("closed-loop poles, 1/s", AnyValue("pole", (_REAL, _PAIR)), "two poles", 2),
     "observer_pole": observer.POLE,
     "gains": Items("in place of poles", Quantity("gain"), "[g1, g2], in 1/s² and 1/s", 2),
 }
+OF_SPEED: Mapping[str, Declaration] = {"speed_pole": speed_tracking.POLE}
+OPTIONS: Mapping[str, Declaration] = {**OF_POSITION, **OF_SPEED}
 POLES = ((-32.0, 24.0), (-32.0, -24.0))  # 1/s: the paper's, settling in 0.125 s
 OBSERVER_POLE = -320.0  # 1/s: the paper's
 TUNABLE = {"g1": Quantity("position gain", "1/s²"), "g2": Quantity("velocity gain", "1/s")}
@@ -77,20 +79,21 @@ def estimated_velocity(y: float, state: tuple[float, float], params: Mapping[str
 def make(
     axis_model: Mapping[str, Any], T: float, converter_range: float, *, unit: str = "mm", **options: Any
 ) -> Controller:
-    """The tracking controller of one position axis; see `rds.controllers.library_controller`.
+    """The tracking controller of one axis; see `rds.controllers.library_controller`.
 
-    Options: `poles`, two closed-loop poles as [real, imaginary] or complex numbers, 1/s (default: the paper's
-    -32 ± 24i); or `gains` = [g1, g2] (1/s², 1/s), already computed; `observer_pole`, 1/s (default -320).
-    Raises InputError for a spindle (its speed is measured, so there is nothing to observe), and for poles too fast
-    for the sample period; gains that are handed in are taken as they are.
+    Options of a position axis: `poles`, two closed-loop poles as [real, imaginary] or complex numbers, 1/s (default:
+    the paper's -32 ± 24i); or `gains` = [g1, g2] (1/s², 1/s), already computed; `observer_pole`, 1/s (default -320).
+    Of a spindle: `speed_pole`, 1/s (default -32). Raises InputError for an option of the other kind of axis, and for
+    poles too fast for the sample period; gains that are handed in are taken as they are.
     """
     owner = f"controller {NAME!r}"
     check_known(options, OPTIONS, owner)
     if unit == SPINDLE_UNIT:
-        raise InputError(
-            f"{owner} drives position axes: a spindle (unit {unit!r}) has its speed measured and nothing to observe; "
-            f"use 'p', 'pid' or 'modified-pid'"
+        _refuse(options, OF_POSITION, f"{owner}: a spindle has its speed measured and nothing to observe", "speed_pole")
+        return speed_tracking.make(
+            axis_model, T, converter_range, NAME, options.get("speed_pole", speed_tracking.SPEED_POLE)
         )
+    _refuse(options, OF_SPEED, f"{owner}: this axis has its position controlled", "poles")
     axis = axis_data(axis_model, T, converter_range, unit, owner)
     pole = observer.check_pole(options.get("observer_pole", OBSERVER_POLE), owner)
     g1, g2 = _gains(options, axis.tau, owner)
@@ -134,6 +137,13 @@ def _check_sampled(axis: AxisData, g1: float, g2: float, owner: str) -> None:
             f"{owner}: with T = {axis.T:g} s these poles make the sampled loop unstable; "
             f"choose slower poles or a shorter sample period"
         )
+
+
+def _refuse(options: Mapping[str, Any], others: Mapping[str, Declaration], why: str, instead: str) -> None:
+    """InputError for an option of the other kind of axis."""
+    for name in options:
+        if name in others:
+            raise InputError(f"{why}; remove {name}, or give {instead}")
 
 
 def _gains(options: Mapping[str, Any], tau: float, owner: str) -> tuple[float, float]:

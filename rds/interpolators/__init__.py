@@ -20,12 +20,14 @@ __getattr__, __dir__ = face(
         "Certificate": "motion.certificate",
         "Limits": "motion.limits",
         "arc": "motion.segments",
+        "blended": "motion.blended",
         "certified": "motion.certificate",
         "chain": "motion.segments",
         "line": "motion.segments",
         "make_acceleration": "acceleration",
         "plan": "motion.planner",
         "point_to_point": "motion.point_to_point",
+        "trapezoid": "motion.trapezoid",
     },
 )
 

@@ -67,19 +67,38 @@ def over_time(
 
 def path(done: Interpolation) -> Picture:
     """The path in each plane in which it goes somewhere: programmed, and as interpolated."""
-    going = [k for k in range(len(done.axes)) if np.ptp(done.theory[:, k]) > 0.0] or [0]
-    planes = list(combinations(going, 2))[:3] or [(going[0], (going[0] + 1) % len(done.axes))]
+    going = [k for k in range(len(done.axes)) if np.ptp(done.theory[:, k]) > 0.0]
+    return in_planes(done.axes, going, _programmed(done), done.position)
+
+
+def in_planes(names: Sequence[str], going: Sequence[int], programmed: np.ndarray, position: np.ndarray) -> Picture:
+    """Points of the programmed path, and samples (rows; mm, one column for each of `names`), in each plane of two of
+    the axes `going`.
+    """
+    going = going or [0]
+    planes = list(combinations(going, 2))[:3] or [(going[0], (going[0] + 1) % len(names))]
     picture = Picture(4.8, max(6.0, 4.8 * len(planes)))
     grid = picture.subplots(1, len(planes), squeeze=False)[0]
-    programmed = _programmed(done)
     for axes, (i, j) in zip(grid, planes, strict=True):
         axes.plot(programmed[:, i], programmed[:, j], color=GREY, linewidth=4.0, alpha=0.45, label="programmed")
-        axes.plot(done.position[:, i], done.position[:, j], color=BLUE, linewidth=1.1, label="interpolated")
-        axes.plot(*done.position[0, [i, j]], "o", color=BLUE, markersize=6, label="start")
-        axes.plot(*done.position[-1, [i, j]], "s", color=VERMILLION, markersize=6, label="end")
-        dress(axes, f"{done.axes[j]} [mm]", f"{done.axes[i]} [mm]")
+        axes.plot(position[:, i], position[:, j], color=BLUE, linewidth=1.1, label="interpolated")
+        axes.plot(*position[0, [i, j]], "o", color=BLUE, markersize=6, label="start")
+        axes.plot(*position[-1, [i, j]], "s", color=VERMILLION, markersize=6, label="end")
+        dress(axes, f"{names[j]} [mm]", f"{names[i]} [mm]")
         axes.set_aspect("equal", adjustable="datalim")
     legend(grid[0])
+    return picture
+
+
+def speed(time: np.ndarray, programmed: np.ndarray, along: np.ndarray, unit: str) -> Picture:
+    """The speed `along` the path over time (s), and the programmed feed rate, which is nan where there is none."""
+    picture = Picture(3.4)
+    axes = picture.subplots()
+    axes.plot(time, programmed, color=GREY, linewidth=4.0, alpha=0.45, label="programmed")
+    axes.plot(time, along, color=BLUE, linewidth=1.1, label="along the path")
+    dress(axes, f"speed [{unit}]")
+    axes.set_ylim(bottom=0.0)
+    legend(axes)
     return picture
 
 

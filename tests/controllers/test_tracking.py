@@ -162,9 +162,10 @@ def test_options_that_will_not_do_are_refused(options, fault):
     assert fault in str(error.value)
 
 
-def test_a_spindle_is_told_what_to_use():
-    with pytest.raises(InputError, match="use 'p', 'pid' or 'modified-pid'"):
-        library_controller("tracking", axis_model("spindle"), T, RANGE, unit="rev/min")
+@pytest.mark.parametrize("name", ["feedforward", "zero-phase"])
+def test_a_spindle_is_told_what_to_use(name):
+    with pytest.raises(InputError, match="use 'tracking', 'p', 'pid' or 'modified-pid'"):
+        library_controller(name, axis_model("spindle"), T, RANGE, unit="rev/min")
 
 
 def test_slower_sampling_stays_damped():

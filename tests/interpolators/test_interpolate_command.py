@@ -118,7 +118,8 @@ def test_a_part_program_by_a_profile(tmp_path: Path, profile: str) -> None:
     words = f"{file} --profile {profile} --period 0.01"
     said = numbers(f"{words} --out {tmp_path / 'out'} --plot")
     assert said["certificate"]["ok"] and said["dwell_s"] == 1.0
-    assert [Path(path).name for path in said["files"]] == ["interpolation.csv", "motion.png", "certificate.png"]
+    drawn = [f"{name}.png" for name in ("motion", "feed", "path", "certificate")]
+    assert [Path(path).name for path in said["files"]] == ["interpolation.csv", *drawn]
     table = open_result(tmp_path / "out" / "interpolation.csv")
     assert len(table) == said["samples"] + 1 and table["time"][-1] == pytest.approx(said["time_s"])
     assert [table[f"{axis}_reference"][-1] for axis in "XYZ"] == [60.0, 20.0, -4.0]

@@ -11,10 +11,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.interpolators.motion.blended import ACCEL, CRUISE, DECEL, blended
+from rds.interpolators import blended, trapezoid
+from rds.interpolators.motion.blended import ACCEL, CRUISE, DECEL
 from rds.interpolators.motion.point_to_point import point_to_point
 from rds.interpolators.motion.segments import line
-from rds.interpolators.motion.trapezoid import trapezoid
 
 from .chains import MACHINES, planned
 

@@ -42,8 +42,11 @@ def test_there_are_those_of_the_paper_and_of_the_theses() -> None:
             "hemisphere",
             "dcs-table-5-2",
             "oacs-p001",
+            "slot",
+            "sun",
         )
     }
+    assert PROGRAMS["slot.ngc"].machine == PROGRAMS["sun.ngc"].machine == "three-axis-mill"
     assert PROGRAMS["pyramid.ngc"].machine == "starmill"
     assert PROGRAMS["oacs-p001.ngc"].machine == "mrmt-oacs"
     with pytest.raises(InputError, match="there are circle, dcs-table-5-2"):
@@ -83,6 +86,12 @@ def test_the_shapes_are_what_their_titles_say() -> None:
     assert sides[:4] == [[1, 1], [-1, 1], [-1, -1], [1, -1]]
     strokes = [row["end"] - row["start"] for row in path("pyramid") if row["start"][2] == -6.0 and row["end"][2] == 0.0]
     assert len(strokes) == 24 and all(np.all(stroke[:3] != 0.0) for stroke in strokes)  # three axes at once
+    slot = [row["end"] - row["start"] for row in path("slot") if not row["rapid"]]
+    assert slot[1][:3] == pytest.approx(np.array([2.0, 2.0, -0.3]) * 25.4)  # inches: diagonal in XY and in XZ
+    sun = path("sun")
+    cut = sun[~sun["rapid"] & (np.diff([sun["start"][:, 2], sun["end"][:, 2]], axis=0)[0] == 0.0)]
+    assert cut["length"] == pytest.approx(np.array([1.0, 1.5, 1.0, 1.5, 1.0]) * 25.4)  # a frame, and a bar
+    assert cut["end"][-1][:2] == pytest.approx(np.array([2.0, 1.5]) * 25.4)
     pocket = path("pocket")
     cut = pocket[~pocket["rapid"]]
     assert np.ptp(cut["end"][:, 0]) == 40.0 and np.ptp(cut["end"][:, 1]) == 30.0 and cut["end"][-1, 2] == -1.0

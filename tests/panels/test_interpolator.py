@@ -47,6 +47,20 @@ def test_an_arc_with_its_errors_magnified(open_page: Callable[..., Any], app: Ap
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
 
 
+def test_the_machine_goes_along_the_arc_and_the_model_is_drawn(open_page: Callable[..., Any]) -> None:
+    page = open_page("Interpolator")
+    page.click('button:text-is("View model")')
+    page.wait_for_selector('svg[aria-label*="Circular (interpolator"]')
+    _go(page)
+    page.click('button:text-is("Show the machine")')
+    page.wait_for_selector('.rds-scene[data-open="true"] canvas')
+    page.select_option('.rds-scene select[title="how fast it is played"]', "20")
+    page.wait_for_function(  # it is played to its end, a quarter of a circle further
+        """() => document.querySelector(".rds-scene")?.dataset.tip?.startsWith("0.000 10.000")"""
+    )
+    assert int(page.locator(".rds-scene").get_attribute("data-rows")) > 100
+
+
 def test_a_table_of_segments_and_what_it_refuses(open_page: Callable[..., Any]) -> None:
     page = open_page("Interpolator")
     page.click('button:text-is("Both")')

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rds.core.errors import InputError
 from rds.core.geometry import length, sweep
 from rds.core.types import ArcSegment, LineSegment
-from rds.nc.paths import arc, line, part_program, quadrilateral, quadrilateral_by_moves, spiral_cone
+from rds.nc import arc, line, part_program, quadrilateral, quadrilateral_by_moves, spiral_cone
 from rds.nc.paths.cone import chord_angle, chord_error
 from rds.nc.paths.measure import extent, is_closed, pieces, sampled, total_length
 from tests.paths.programs import agreed, assert_cuts

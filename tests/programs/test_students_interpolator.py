@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 from waiting import wait_for
 
 import rds
+from rds.cli.main import app
 from rds.modes.experiment.run import Run
 from rds.modes.loop.execution import State
 from rds.nc.run.run import PartProgram
@@ -78,6 +80,37 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def circle(**words: Any) -> rds.Experiment:
     reference = {"kind": "path", "interpolator": "mine.py", "acceleration": "s-shape", **CIRCLE, **words}
     return rds.Experiment(axis=["X", "Y"], controller="tracking", sample_period=T, reference=reference)
+
+
+def apart(here: Path) -> dict[str, str]:
+    """The same as two modules, a linear and a circular interpolator, neither of which can do the other's work."""
+    choice = '(arc if hasattr(segment, "centre") else line)(segment, T)'
+    (here / "lines.py").write_text(MINE.replace(choice, "line(segment, T)"))
+    (here / "arcs.py").write_text(MINE.replace(choice, "arc(segment, T)"))
+    return {"interpolator": "lines.py", "arc_interpolator": "arcs.py"}
+
+
+def test_lines_and_arcs_have_interpolators_of_their_own(here: Path) -> None:
+    segments = [{"kind": "line", "end": [2.0, 0.0]}, {"kind": "arc", "end": [2.0, 2.0], "centre": [2.0, 1.0]}]
+    one, two = circle(segment=segments).run(), circle(segment=segments, **apart(here)).run()
+    assert all(np.array_equal(one[name], two[name]) for name in one.columns)
+    assert two.meta["program"]["interpolator"] == "lines.py, arcs by arcs.py"
+    library = circle(segment=segments, acceleration=None, interpolator="linear", arc_interpolator="circular").run()
+    assert library.meta["program"]["path_error"]["max"] < 1e-9  # mm
+    of_program = [PartProgram("part.ngc", sample_period=T, interpolator=each) for each in ("mine.py", apart(here))]
+    one, two = (part.run() for part in of_program)
+    assert all(np.array_equal(one[name], two[name]) for name in one.columns)
+    with pytest.raises(rds.InputError, match=r"arc_interpolator.* there is no file .*none.py"):
+        circle(segment=segments, arc_interpolator="none.py")
+    with pytest.raises(rds.InputError, match="arc_interpolator goes with an interpolator"):
+        planned = {"kind": "path", "profile": "planned", "arc_interpolator": "circular", **CIRCLE}
+        rds.Experiment(axis=["X", "Y"], controller="tracking", reference=planned)
+    words = ["nc", "run", "part.ngc", "--arc-interpolator", "circular"]
+    refused = CliRunner().invoke(app, words)
+    assert refused.exit_code == 2 and "--arc-interpolator goes with --interpolator" in refused.stderr
+    done = CliRunner().invoke(app, [*words, "--interpolator", "linear", "--out", "both", "--json"])
+    assert done.exit_code == 0, done.stderr
+    assert rds.open_result("both").meta["program"]["interpolator"] == "linear, arcs by circular"
 
 
 def part() -> PartProgram:

@@ -10,9 +10,9 @@ from rds.modes.experiment.experiment import Experiment
 from rds.panels.equipment.equations import equations, equations_html
 
 
-def lines(controller: dict[str, Any]) -> dict[str, list[str]]:
+def lines(controller: dict[str, Any], axis: str = "X") -> dict[str, list[str]]:
     reference = {"kind": "sinusoid", "amplitude": 5.0, "frequency": 0.2}
-    words = {"machine": "mini-cnc", "axis": "X", "mode": "simulation", "duration": 1.0, "reference": reference}
+    words = {"machine": "mini-cnc", "axis": axis, "mode": "simulation", "duration": 1.0, "reference": reference}
     return dict(equations(Experiment.from_table(words | {"controller": controller}).plan()))
 
 
@@ -39,6 +39,11 @@ def test_the_model_has_the_machine_s_numbers() -> None:
 )
 def test_the_laws_have_theirs(controller: dict[str, Any], said: str) -> None:
     assert lines(controller)["Controller of X"][0].startswith(said)
+
+
+def test_the_tracking_law_of_a_spindle_has_its_speed() -> None:
+    said = lines({"name": "tracking"}, "spindle")["Controller of spindle"]
+    assert said == ["u = 8e−05 (ṙ + 19.5 (r − y)) + 0.001 r V   [rev/min]"]
 
 
 def test_what_is_the_student_s_is_named_and_escaped() -> None:

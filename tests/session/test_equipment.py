@@ -45,8 +45,9 @@ def test_the_first_sine_is_a_sine_on_x_whatever_was_chosen(tmp_path: Path) -> No
 def test_a_spindle_is_not_offered_what_it_cannot_have(tmp_path: Path) -> None:
     equipment = Equipment(Session(tmp_path), "control")
     choose(equipment, system="spindle")
-    assert "tracking" not in equipment.choices.fields["controller"].options
-    assert equipment.table()["controller"] == {"name": "pid"}
+    assert "feedforward" not in equipment.choices.fields["controller"].options
+    assert equipment.parameters == ["controller.speed_pole"]
+    assert equipment.table()["controller"] == {"name": "tracking", "speed_pole": -32.0}
     assert equipment.choices.fields["amplitude"].unit == "rev/min"
     choose(equipment, system="X", controller="tracking")
     assert equipment.parameters == ["controller.pole", "controller.pole_imaginary", "controller.observer_pole"]
@@ -108,6 +109,7 @@ def test_parameters_are_those_of_the_library_with_their_units(tmp_path: Path) ->
         ("control", {}),
         ("control", {"controller": "pid", "controller__Pgain": 12.5, "system": "Y", "shape": "triangle"}),
         ("control", {"controller": "tracking", "controller__pole": -20.0, "controller__pole_imaginary": 0.0}),
+        ("control", {"system": "spindle", "controller": "tracking", "controller__speed_pole": -50.0}),
         ("control", {"controller": "user", "controller_file": "mine.py", "offset": 1.0}),
         ("control", {"shape": "user", "shape_file": "2*sin(t)+t"}),
         ("control", {"shape": "chirp", "signal__highest": 5.0, "controller": "smith", "controller__law": "p"}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from pathlib import Path
 
@@ -263,7 +264,7 @@ def test_an_interpolator_makes_the_motion(tmp_path: Path, monkeypatch: pytest.Mo
     made = program(tmp_path, "G21 G90", "G1 X6 F600", "G2 X0 Y0 I-3 J0", "M2")
     assert looked(made).ok and set(MADE) <= made.idle()
     made.choices.set("interpolator", "tustin")
-    assert made.idle() == {"interpolator_file"}
+    assert made.idle() == {"interpolator_file", "arc_interpolator_file"}
     made.choices.set("override", 110.0)
     work = made.run().start()
     assert work.wait(PATIENCE) and work.error is None and work.result is not None
@@ -281,6 +282,14 @@ def test_an_interpolator_makes_the_motion(tmp_path: Path, monkeypatch: pytest.Mo
     made.choices.set("interpolator_file", "mine.py")
     work = made.run().start()
     assert work.wait(PATIENCE) and isinstance(work.error, InputError) and "mine.py" in str(work.error)
+    made.choices.set("arc_interpolator_file", "arcs.py")
+    with pytest.raises(InputError, match="interpolator's file is not there"):
+        made.run()
+    for name in ("mine.py", "arcs.py"):  # one for lines, and one for arcs
+        shutil.copy(Path(__file__).parents[2] / "examples" / "my_interpolator.py", tmp_path / name)
+    work = made.run().start()
+    assert work.wait(PATIENCE) and work.error is None and work.result is not None
+    assert work.result.meta["program"]["interpolator"] == "mine.py, arcs by arcs.py"
 
 
 def test_one_controller_for_all_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

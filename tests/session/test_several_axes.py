@@ -96,6 +96,19 @@ def test_several_axes_follow_a_path_to_its_end(tmp_path: Path, values: dict[str,
     assert run.result.meta["program"]["completed"]
 
 
+def test_lines_and_arcs_may_have_files_of_their_own(tmp_path: Path) -> None:
+    """mine.py goes straight to the end of any segment, and could not go round."""
+    shutil.copy(EXAMPLES / "my_interpolator.py", tmp_path / "arcs.py")
+    words = {"system": "X+Y", "shape": "circle", "radius": 1.0, "laps": 1, "acceleration": "none"}
+    equipment = control(tmp_path, **words, interpolator="user", interpolator_file="mine.py")
+    assert "arc_interpolator" not in equipment.table()["reference"] and len(equipment.files()) == 1
+    equipment.choices.set("arc_interpolator_file", "arcs.py")
+    assert equipment.table()["reference"]["arc_interpolator"] == "arcs.py"
+    assert [path.name for _, path in equipment.files()] == ["mine.py", "arcs.py"]
+    about = finished(equipment).result.meta["program"]
+    assert about["completed"] and about["path_error"]["max"] < 1e-9  # mm
+
+
 def test_each_axis_may_follow_the_same_signal(tmp_path: Path) -> None:
     equipment = control(tmp_path, system="X+Y", shape="sinusoid", duration=0.2)
     assert "interpolator" not in equipment.shown and "duration" in equipment.shown and "laps" not in equipment.shown

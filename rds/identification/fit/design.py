@@ -64,7 +64,8 @@ def linear_axis_of(model: Linear | ModelFile | Estimate | str | Path) -> Linear:
     made = run_model(file)
     if file.structure == "spindle":
         raise InputError(
-            "a spindle has its speed measured, and there is nothing to observe; use the controller 'pid'", file.path
+            "a spindle has its speed measured, and there is nothing to observe; use the controller 'tracking' or 'pid'",
+            file.path,
         )
     if not {"tau", "K"} <= set(made.params):
         raise InputError("the design needs tau (s) and K ((mm/s)/V), which this model does not have", file.path)
@@ -97,7 +98,8 @@ def linear_axis_of_machine(machine: Machine, name: str) -> Linear:
     axis = machine.axis(name)
     if axis.unit == SPINDLE_UNIT:
         raise InputError(
-            f"{name} is a spindle: its speed is measured, and there is nothing to observe; use the controller 'pid'"
+            f"{name} is a spindle: its speed is measured, and there is nothing to observe; "
+            "use the controller 'tracking' or 'pid'"
         )
     params = axis.model
     return Linear(params["tau"], params["K"], left_out_of(params), f"axis {name} of {machine.name}", unit=axis.unit)

@@ -58,7 +58,7 @@ def resolve(
     written = words.read("mode")
     mode = load_mode(written if mode_name is None else mode_name)
     T = words.read("sample_period", machine.sample_period)
-    drawn, own_file = _path(words, folder, machine, T, planned or LastMade()) if program is None else (None, None)
+    drawn, own_files = _path(words, folder, machine, T, planned or LastMade()) if program is None else (None, ())
     leads = program or drawn
     samples = _samples(words, T) if leads is None else leads.samples
     words.read("compiled")
@@ -95,7 +95,7 @@ def resolve(
         quantization=quantization,
         bus=bus,
         network=network,
-        import_path=_import_path(axes, own_file),
+        import_path=_import_path(axes, own_files),
         program=leads,
         notes=tuple(notes),
         **timing,
@@ -105,11 +105,11 @@ def resolve(
 
 def _path(
     words: TomlTable, folder: Path, machine: Machine, T: float, planned: LastMade
-) -> tuple[InterpolatedProgram | Program | None, str | None]:
-    """The path that all axes of the run follow, and the file of its interpolator, if the user wrote one."""
+) -> tuple[InterpolatedProgram | Program | None, tuple[str, ...]]:
+    """The path that all axes of the run follow, and the files of its interpolators that the user wrote."""
     given = words.any("reference")
     if not is_path(given):
-        return None, None
+        return None, ()
     for key, why in (
         ("signal", "a signal drives the axes without a controller"),
         ("duration", "the path says how long the run lasts"),
@@ -122,7 +122,7 @@ def _path(
     table.declared = PATHS.module(kind).WORDS
     names = [axis.name for axis, _ in _axes(words, machine)]
     try:
-        made: tuple[InterpolatedProgram | Program, str | None]
+        made: tuple[InterpolatedProgram | Program, tuple[str, ...]]
         made = PATHS.module(kind).program(table, folder, machine, names, T, planned)
     except InputError as error:
         raise error if error.where else InputError(str(error), table.place()) from error
@@ -387,7 +387,7 @@ def _check_coupling(axes: list[AxisPlan], words: TomlTable) -> None:
         raise InputError("name the spindle last: the axes of a coupled controller stand together", words.place("axes"))
 
 
-def _import_path(axes: list[AxisPlan], interpolator: str | None) -> tuple[str, ...]:
+def _import_path(axes: list[AxisPlan], interpolators: tuple[str, ...]) -> tuple[str, ...]:
     paths = [part.source.path for plan in axes for part in (plan.controller, plan.model) if part is not None]
-    paths.append(interpolator)
+    paths += interpolators
     return tuple(dict.fromkeys(str(Path(path).parent) for path in paths if path and path.endswith(".py")))

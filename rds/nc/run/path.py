@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,8 +45,9 @@ from rds.results import Result
 SUFFIX = ".toml"  # of a path file; any other is a part program
 MOST_SAMPLES = 20_000_000
 _MOST_AHEAD = 100_000
-_OF_AN_INTERPOLATOR = ("interpolator", "params", "acceleration", "exact_stop", "look_ahead")
+_OF_AN_INTERPOLATOR = ("interpolator", "arc_interpolator", "params", "acceleration", "exact_stop", "look_ahead")
 
+_FORMS = (Choice("of the library", LIBRARY.names), Text("your .py file"))
 WORDS = Table(
     "a path of lines and arcs that all axes of the run follow together, by an interpolator or a planned profile",
     {
@@ -54,9 +56,8 @@ WORDS = Table(
         "feed": SEGMENTS.keys["feed"],
         "feed_unit": SEGMENTS.keys["feed_unit"],
         "segment": SEGMENTS.keys["segment"],
-        "interpolator": AnyValue(
-            "what makes the samples", (Choice("of the library", LIBRARY.names), Text("your .py file")), DEFAULT
-        ),
+        "interpolator": AnyValue("what makes the samples", _FORMS, DEFAULT),
+        "arc_interpolator": AnyValue("another one for arcs; interpolator then takes the lines", _FORMS),
         "params": Table("options of the interpolator", others=AnyValue("option, or parameter of the file")),
         "acceleration": AnyValue(
             "a filter on top of it: its name, or a table with its options",
@@ -88,18 +89,27 @@ WORDS = Table(
 
 @dataclass(frozen=True)
 class Method:
-    """What makes the samples of a path: an interpolator, a filter on top of it, and how many rows ahead it works."""
+    """What makes the samples of a path: an interpolator, a filter on top of it, and how many rows ahead it works.
+
+    `arcs` is another interpolator for the arcs, if there is one.
+    """
 
     interpolator: Interpolator
     acceleration: Acceleration | None = None
     exact_stop: bool = False
     ahead: int = LEAST_AHEAD
+    arcs: Interpolator | None = None
+
+    @property
+    def interpolators(self) -> tuple[Interpolator, ...]:
+        """That of lines, and that of arcs where it is another one."""
+        return (self.interpolator,) if self.arcs is None else (self.interpolator, self.arcs)
 
 
 def program(
     words: TomlTable, folder: Path, machine: Machine, axes: Sequence[str], T: float, last: LastMade
-) -> tuple[InterpolatedProgram | Program, str | None]:
-    """The program of a `[reference]` table for the axes of a run, and the path of the user's interpolator.
+) -> tuple[InterpolatedProgram | Program, tuple[str, ...]]:
+    """The program of a `[reference]` table for the axes of a run, and the paths of the user's interpolators.
 
     Of a planned motion, what was planned last is in `last`, and is taken where nothing has changed.
     InputError with the place of the words that won't do.
@@ -112,7 +122,7 @@ def program(
             words.place(given[0]),
         )
     method = method_of(words, folder) if profile is None else None
-    own_file = None if method is None else method.interpolator.source.path
+    own_files = tuple(each.source.path for each in method.interpolators if each.source.path) if method else ()
     file = words.read("file")
     inline = [key for key in ("start", "feed", "segment") if key in words]
     if (file is None) != bool(inline):
@@ -135,7 +145,7 @@ def program(
             )
         if made.spindle is not None and made.spindle not in axes:
             made = _noted(replace(made, spindle=None), f"the spindle stands: {made.spindle} is none of the run's axes")
-        return made, own_file
+        return made, own_files
     if file is not None:
         segments, name = read_segments(folder / file), str(file)
     else:
@@ -160,7 +170,7 @@ def program(
         made = last.get(of, lambda: _planned(*of))
     if is_led:
         made = _noted(made, f"the axes begin at 0: a straight line leads to the start of the path, {first.end}")
-    return made, own_file
+    return made, own_files
 
 
 def _planned(
@@ -230,29 +240,33 @@ def of_part_program(
 
 
 def method_of(words: TomlTable, folder: Path) -> Method:
-    """What the words `interpolator`, `params`, `acceleration`, `exact_stop` and `look_ahead` of a table ask for."""
-    given = words.any("interpolator", DEFAULT)
-    given = str(given) if isinstance(given, Path) else given
+    """What the words of a table ask for: its interpolators, the filter on top, and how far it works ahead."""
     params = words.inner("params")
-    options = dict(params.table) if params else {}
-    if isinstance(given, Interpolator):
-        found = given
-    elif isinstance(given, StudentFile):
-        found = from_student(given, options)
-    elif callable(given):
-        found = from_student(from_function(given), options)
-    elif isinstance(given, str):
-        is_file = given not in LIBRARY.modules and given.endswith(".py")
-        if is_file and not (folder / given).is_file():
-            raise words.fault("interpolator", f"will not do: there is no file {folder / given}")
-        found = find_interpolator(str(folder / given) if is_file else given, options)
-    else:
-        raise words.fault("interpolator", "must be a name of the library, the path of a .py file, or a function")
+    found = _interpolator(words, "interpolator", folder, dict(params.table) if params else {})
+    arcs = _interpolator(words, "arc_interpolator", folder, {}) if "arc_interpolator" in words else None
     filter_ = _filter(words)
     exact_stop = words.read("exact_stop")
     if exact_stop and filter_ is None:
         raise words.fault("exact_stop", "goes with acceleration, which is not given: without it no segment slows down")
-    return Method(found, filter_, exact_stop, words.read("look_ahead"))
+    return Method(found, filter_, exact_stop, words.read("look_ahead"), arcs)
+
+
+def _interpolator(words: TomlTable, key: str, folder: Path, options: Mapping[str, Any]) -> Interpolator:
+    """What one of the words names."""
+    given = words.any(key, DEFAULT)
+    given = str(given) if isinstance(given, Path) else given
+    if isinstance(given, Interpolator):
+        return given
+    if isinstance(given, StudentFile):
+        return from_student(given, options)
+    if callable(given):
+        return from_student(from_function(given), options)
+    if not isinstance(given, str):
+        raise words.fault(key, "must be a name of the library, the path of a .py file, or a function")
+    is_file = given not in LIBRARY.modules and given.endswith(".py")
+    if is_file and not (folder / given).is_file():
+        raise words.fault(key, f"will not do: there is no file {folder / given}")
+    return find_interpolator(str(folder / given) if is_file else given, options)
 
 
 def _filter(words: TomlTable) -> Acceleration | None:
@@ -296,12 +310,13 @@ def program_of(
     check_chain(segments, T)
     check_room(segments, lines, machine, axes)
     weights = method.acceleration.weights(T) if method.acceleration else np.ones(1)
+    lines_by, arcs_by = method.interpolator, method.arcs or method.interpolator
     ends = set(due) | (set(range(len(segments))) if method.exact_stop else set()) | {len(segments) - 1}
     stretches, begin, samples = [], 0, 1
     for end in sorted(ends):
         part = tuple(segments[begin : end + 1])
         happens = tuple(due.get(end, ()))
-        stretches.append(Stretch(_Rows(part, begin, method.interpolator, weights, T), happens))
+        stretches.append(Stretch(_Rows(part, begin, lines_by, arcs_by, weights, T), happens))
         samples += sum(ceil(length(each) / each.feed_rate / T - 1e-9) for each in part) + len(weights) - 1
         samples += sum(dwell_samples(each.value, T) for each in happens if each.kind == "dwell")
         begin = end + 1
@@ -326,8 +341,9 @@ def program_of(
         travel=np.array([machine.axes[each].travel for each in axes], dtype=float),
         path=in_machine_axes(segments, lines, order),
         about={
-            "interpolator": method.interpolator.name,
+            "interpolator": ", arcs by ".join(each.name for each in method.interpolators),
             "interpolator_params": dict(method.interpolator.params),
+            **({} if method.arcs is None else {"arc_interpolator_params": dict(method.arcs.params)}),
             "acceleration": None if filter_ is None else {"name": filter_.name, **filter_.params},
             "exact_stop": method.exact_stop,
             "look_ahead": method.ahead,
@@ -342,19 +358,20 @@ class _Rows:
 
     segments: tuple[Segment, ...]
     first: int
-    method: Interpolator
+    lines: Interpolator
+    arcs: Interpolator
     weights: np.ndarray
     T: float
 
     def __call__(self) -> Iterator[Row]:
         number = self.first - 1
-        blu = self.method.blu
+        blu = next((each.blu for each in (self.lines, self.arcs) if each.blu is not None), None)
 
         def made() -> Iterator[np.ndarray]:
             nonlocal number
             for segment in self.segments:
                 number += 1
-                yield from self.method.each(segment, self.T)
+                yield from (self.arcs if isinstance(segment, ArcSegment) else self.lines).each(segment, self.T)
 
         rows: Iterable[Sequence[np.ndarray]] = made()  # type: ignore[assignment]
         if len(self.weights) > 1:

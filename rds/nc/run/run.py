@@ -146,10 +146,10 @@ class PartProgram(Experiment):
     more: controllers and models of single axes, interface, timing, bus.
 
     With `interpolator` (a name of the library, the path of a student's .py file, a function, or a table with
-    `interpolator`, `params` and `look_ahead`) its moves are not planned: the interpolator makes the samples inside the
-    loop, with `acceleration` (a filter's name, or a table with `name` and `time`) on top, and at rest at the end of
-    each segment if `exact_stop`. Else `profile` says how the motion is planned: "planned" (within the jerk, blending),
-    "trapezoid", "blended" or "point-to-point".
+    `interpolator`, `arc_interpolator`, `params` and `look_ahead`) its moves are not planned: the interpolator makes the
+    samples inside the loop, with `acceleration` (a filter's name, or a table with `name` and `time`) on top, and at
+    rest at the end of each segment if `exact_stop`. Else `profile` says how the motion is planned: "planned" (within
+    the jerk, blending), "trapezoid", "blended" or "point-to-point".
 
     With `begin` (a line) it is run from there: the axes go up, across and down to where the first move of this line or
     a later one begins, with the tool, the spindle and the coolant of the lines before. With `steps` it comes to rest

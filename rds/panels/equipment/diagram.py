@@ -117,6 +117,8 @@ def _path_lines(shape: Mapping[str, Any]) -> tuple[str, ...]:
     if "profile" in shape:
         return path, *feed, str(shape["profile"])
     name = str(shape["interpolator"]).rpartition("/")[2]
+    if "arc_interpolator" in shape:
+        name += f", {str(shape['arc_interpolator']).rpartition('/')[2]}"
     return (path, *feed, name, *([f"{shape['acceleration']['name']} filter"] if "acceleration" in shape else []))
 
 

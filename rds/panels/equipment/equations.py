@@ -44,6 +44,9 @@ def _law(name: str, params: Mapping[str, Any], unit: str) -> list[str]:
         slope = f"{_n(p['Dgain'])} d/dt ({_n(p['c'])} r − y)"
         rest = f" + {_n(p['bias'])}" if p["bias"] else ""
         return [f"u = {weighted} + {_n(p['Igain'])} ∫(r − y) dt + {slope}{rest} V"]
+    if name == "tracking" and "speed_pole" in p:
+        inverse_gain, inertia = params["coefficients"][:2]
+        return [f"u = {_n(inertia)} (ṙ {_signed(p['g1'])} (r − y)) + {_n(inverse_gain)} r V   [{unit}]"]
     if name == "tracking" and "g1" in p:
         lines = [f"u = (τ/K) (r̈ + ṙ/τ + {_n(p['g1'])} (r − y) {_signed(p['g2'])} (ṙ − v̂)) V"]
         coefficients = params.get("coefficients")

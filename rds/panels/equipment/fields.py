@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.controllers import controller_module, controller_names, is_for_spindle
+from rds.controllers.speed_tracking import SPEED_POLE
 from rds.controllers.tracking import OBSERVER_POLE, POLES
 from rds.core.quantities import Declaration, Quantity
 from rds.core.shared_quantities import SAMPLE_PERIOD
@@ -42,6 +43,7 @@ _CONTROLLERS = {
 }
 MODELS = {"default": "Default", USER: "User-defined"}
 POLE, POLE_OFFSET, OBSERVER = f"{PREFIX}pole", f"{PREFIX}pole_imaginary", f"{PREFIX}observer_pole"
+OF_SPINDLE = f"{PREFIX}speed_pole"
 _COMMENT = 40  # characters of a file's comment that stand beside a field
 _FIRST_OF = {"lowest": 0.5, "highest": 20.0, "sweep": 5.0, "steps": 5}  # Hz, Hz, s
 # first values that every axis of the mini CNC can follow: (amplitude, frequency) by what is driven
@@ -139,9 +141,9 @@ def _path_fields() -> Iterable[Field]:
 
 
 def controllers(axis: Axis) -> Choice:
-    """The controllers that an axis can have: a spindle has nothing to observe."""
+    """The controllers that an axis can have: a spindle has no position."""
     fitting = [name for name in controller_names() if axis.unit != SPINDLE or is_for_spindle(name)]
-    first = "tracking" if "tracking" in fitting else "pid"
+    first = "pid" if axis.unit == SPINDLE else "tracking"
     options = labels(fitting, _CONTROLLERS) | {USER: "User-defined"}
     return Choice("controller", "Controller", "the law that answers with a voltage", first, options)
 
@@ -165,7 +167,7 @@ def parameter_fields(controller: str, axis: Axis) -> Iterable[Field]:
     if controller == USER:
         return
     if controller == "tracking":
-        yield from _tracking_fields()
+        yield from _speed_fields() if axis.unit == SPINDLE else _tracking_fields()
         return
     options: Mapping[str, Declaration] = controller_module(controller).OPTIONS
     for name, option in options.items():
@@ -209,7 +211,9 @@ def own_fields(path: Path, prefix: str) -> Iterable[Number]:
 
 
 def tracking_options(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The tracking controller's options from the values of its fields: a pair of poles, and the observer's."""
+    """The tracking controller's options from its fields: a pair of poles and the observer's; of a spindle, one pole."""
+    if OF_SPINDLE in values:
+        return {"speed_pole": values[OF_SPINDLE]}
     real, imaginary = values[POLE], values[POLE_OFFSET]
     return {"poles": [[real, imaginary], [real, -imaginary]], "observer_pole": values[OBSERVER]}
 
@@ -237,6 +241,11 @@ def _tracking_fields() -> Iterable[Field]:
         low=-1e5,
         high=-0.1,
     )
+
+
+def _speed_fields() -> Iterable[Field]:
+    tip = "closed-loop pole of the speed: further left is faster"
+    yield Number(OF_SPINDLE, "Pole", tip, SPEED_POLE, unit="1/s", low=-1e4, high=-0.1)
 
 
 def _parameter(name: str, option: Declaration, unit: str) -> Field:

@@ -16,7 +16,7 @@ from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
-from rds.panels.session.email import check_address, mail_server, send_files
+from rds.panels.session.email import check_addresses, mail_server, send_files
 from rds.panels.session.fields import Text
 from rds.panels.session.save_as import save_as
 from rds.panels.session.task import Task
@@ -105,7 +105,12 @@ class ResultActions:
             [
                 Text("save_as", "Save as", "a name that ends with .csv, .mat or .parquet", "", "e.g. first.csv"),
                 Text(
-                    "send_to", "E-mail to", "addresses, separated by commas", "", "e.g. me@example.edu", refuse=_refuse
+                    "send_to",
+                    "E-mail to",
+                    "addresses, separated by commas",
+                    "",
+                    "e.g. me@example.edu",
+                    refuse=check_addresses,
                 ),
             ],
         )
@@ -147,8 +152,3 @@ class ResultActions:
 
     def _succeeded(self, sentence: str) -> None:
         self.notice.say(sentence, "good")
-
-
-def _refuse(text: str) -> None:
-    for each in text.split(","):
-        check_address(each)

@@ -7,13 +7,13 @@ import ipywidgets as widgets
 from rds.panels.equipment.fields import FERROR, PREFIX, SIZES
 from rds.panels.equipment.parameters import Folded, Parameters, box_of_fields, count_changed, fill
 from rds.panels.equipment.state import Equipment
-from rds.panels.interpolator.motion import MADE
+from rds.panels.interpolator.motion import MADE, OWN
 from rds.panels.kit.field import FieldView
 
 _GROUPS = (
     ("system", "mode"),
     ("shape", "shape_file", "path_file", *SIZES, "radius", "feed", "laps"),
-    ("interpolator", "interpolator_file", *MADE),
+    ("interpolator", *OWN, *MADE),
     ("controller", "controller_file", "coupled"),
     ("model", "model_file"),
     ("duration", "sample_period", FERROR),

@@ -23,6 +23,7 @@ from rds.panels.equipment.fields import (
     FERROR,
     OF_MODEL,
     OF_SIGNAL,
+    OF_SPINDLE,
     PATH,
     POLE,
     PREFIX,
@@ -41,7 +42,7 @@ from rds.panels.equipment.fields import (
     tracking_options,
 )
 from rds.panels.equipment.run import EquipmentRun
-from rds.panels.interpolator.motion import MADE, PLANNED, filter_of, idle_motion
+from rds.panels.interpolator.motion import ARC_FILE, MADE, OWN, PLANNED, filter_of, idle_motion
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, value_of
 from rds.panels.session.formula import formula_file
@@ -174,7 +175,9 @@ class Equipment:
         """What the student's files stand for, and where they are; InputError where one is not named."""
         found = []
         for name, role in _ROLES.items():
-            if name in self.shown and (name != "shape_file" or self._is_file()):
+            if name not in self.shown or (name == ARC_FILE and not str(self.choices[name]).strip()):
+                continue
+            if name != "shape_file" or self._is_file():
                 found.append((role, self.session.folder / self._file(name, role)))
         return found
 
@@ -252,7 +255,8 @@ class Equipment:
         own = chosen["interpolator"] == USER
         name = self._file("interpolator_file", "interpolator") if own else chosen["interpolator"]
         told = {key: value for key, value in filter_of(chosen.values()).items() if value}
-        return {"interpolator": name, **told}
+        arcs = str(chosen[ARC_FILE]).strip() if own else ""
+        return {"interpolator": name, **({"arc_interpolator": arcs} if arcs else {}), **told}
 
     def _is_file(self) -> bool:
         return str(self.choices["shape_file"]).strip().lower().endswith(".csv")
@@ -262,7 +266,7 @@ class Equipment:
         if chosen["controller"] == USER:
             own = self._own("controller_file", "controller", self.parameters)
             return own | ({"coupled": True} if self.coupled else {})
-        if POLE in chosen:
+        if POLE in chosen or OF_SPINDLE in chosen:
             return {"name": chosen["controller"]} | tracking_options(chosen.values())
         given = {name.removeprefix(PREFIX): value_of(chosen.fields[name], chosen[name]) for name in self.parameters}
         return {"name": chosen["controller"]} | {name: value for name, value in given.items() if value is not None}
@@ -341,11 +345,11 @@ class Equipment:
 _FILES = {"shape_file": "shape", "model_file": "model", "controller_file": "controller"}  # shown for what is the user's
 _ROLES = {
     "shape_file": "signal",
-    "interpolator_file": "interpolator",
+    **dict.fromkeys(OWN, "interpolator"),
     "model_file": "model",
     "controller_file": "controller",
 }
-_OF_PATH = {"path_file", "radius", "feed", "laps", "interpolator", "interpolator_file", *MADE}
+_OF_PATH = {"path_file", "radius", "feed", "laps", "interpolator", *OWN, *MADE}
 
 
 def _plain(number: float | None) -> float | int | None:

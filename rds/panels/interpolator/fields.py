@@ -14,6 +14,7 @@ from rds.interpolators import DEFAULT, interpolator_module, interpolator_names
 from rds.interpolators.acceleration import LIBRARY as FILTERS
 from rds.interpolators.segment_rows import FEED_UNITS, segments_of
 from rds.nc.bundled import bundled, bundled_paths
+from rds.panels.session.email import check_addresses
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text, labels
 
 USER = "user"
@@ -73,6 +74,8 @@ def fields() -> Iterable[Field]:
     yield Text("arc_file", "File for arcs", "a Python file with interpolate()", "", "e.g. my_interpolator.py")
     yield from filter_fields(NONE, 0.02)
     yield Text("file", "Save as", "a name that ends with .csv, .mat or .parquet", "interpolation.csv")
+    tip, example = "addresses, separated by commas", "e.g. me@example.edu"
+    yield Text("send_to", "E-mail to", tip, "", example, refuse=check_addresses)
 
 
 def filter_fields(name: str, seconds: float) -> Iterable[Field]:

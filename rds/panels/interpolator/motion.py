@@ -10,6 +10,8 @@ from rds.panels.interpolator.fields import USER, filter_fields, filter_words
 from rds.panels.session.fields import Choice, Field, Text
 
 PLANNED = "planned"
+ARC_FILE = "arc_interpolator_file"
+OWN = ("interpolator_file", ARC_FILE)  # files of one's own
 MADE = ("acceleration", "acceleration_time", "exact_stop")  # choices about an interpolator
 
 
@@ -24,13 +26,15 @@ def motion_fields() -> Iterable[Field]:
         {PLANNED: "planned"} | methods | {USER: "user-defined interpolator"},
     )
     yield Text("interpolator_file", "Interpolator's file", "a Python file with interpolate()", "", "my_interpolator.py")
+    tip = "a Python file with interpolate() for arcs; empty: the file above takes lines and arcs"
+    yield Text(ARC_FILE, "Another file for arcs", tip, "", "e.g. my_arcs.py")
     yield from filter_fields("s-shape", 0.1)
 
 
 def idle_motion(chosen: Mapping[str, Any]) -> set[str]:
     """The names of those that say nothing, as it is chosen."""
     name = chosen["interpolator"]
-    idle = set() if name == USER else {"interpolator_file"}
+    idle = set() if name == USER else set(OWN)
     if name == PLANNED:
         return idle | set(MADE)
     return idle | ({"acceleration_time", "exact_stop"} if filter_words(chosen) is None else set())

@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import escape
 from typing import Any, TypeVar
 
 import ipywidgets as widgets
+import numpy as np
 
 from rds.core.errors import InputError
 from rds.interpolators.result import Interpolation
+from rds.machines import load_machine
 from rds.panels.code.state import Code
 from rds.panels.code.view import CodeView
 from rds.panels.equipment.build import Checked
 from rds.panels.equipment.what_runs import source_html
+from rds.panels.interpolator.diagram import diagram
 from rds.panels.interpolator.fields import USER
 from rds.panels.interpolator.segment_table import SegmentTable
 from rds.panels.interpolator.state import Interpolating
 from rds.panels.kit.button import button, follow, runs
+from rds.panels.kit.diagram import diagram_svg
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
+from rds.panels.scene.scene import MachineScene
 from rds.panels.session.task import Task
 from rds.results.html import notes_list, table
 
@@ -38,6 +44,7 @@ _GROUPS = (
     ("line_method", "line_file", "line.", "arc_method", "arc_file", "arc."),
     ("acceleration", "acceleration_time", "exact_stop"),
 )
+_SEEN = 0.01  # s between two samples that are drawn in motion
 _PICTURES = {
     "motion": "Motion",
     "path": "Path",
@@ -77,6 +84,12 @@ class InterpolatorView:
         self.code_button = widgets.ToggleButton(description="Code", tooltip=tip)
         self.code_button.layout.width = "auto"
         self.code_button.observe(lambda change: self._show_code(change["new"]), "value")
+        self.model_button = widgets.ToggleButton(
+            description="View model", tooltip="What interpolates, as a block diagram, as it is chosen now"
+        )
+        self.model_button.layout.width = "auto"
+        self.model_button.observe(lambda change: self._show_model(), "value")
+        self.model = Html()
         self._code_place = widgets.VBox([])
         self._code_view: CodeView | None = None
         self.picture = widgets.ToggleButtons(
@@ -84,15 +97,19 @@ class InterpolatorView:
         )
         self.picture.observe(lambda change: self._draw(), "value")
         self._save_row = self._saving()
-        self.results = widgets.VBox([self.picture, self.figure, self._save_row])
+        self.scene = _scene(self.shell.session.machine)
+        moving = widgets.Box([] if self.scene is None else [self.scene])
+        moving.add_class("rds-live")
+        self.results = widgets.VBox([self.picture, self.figure, self._save_row, moving])
         self.results.layout.display = "none"
         main = widgets.VBox(
             [
-                row(self.run_button, self.check_button, self.code_button),
+                row(self.run_button, self.check_button, self.model_button, self.code_button),
                 self.bar,
                 self.notice,
                 self._code_place,
                 self.segments,
+                self.model,
                 self.source,
                 self.numbers,
                 self.results,
@@ -105,10 +122,15 @@ class InterpolatorView:
         self._arrange()
 
     def _saving(self) -> widgets.HBox:
-        return row(
-            FieldView(self.work.choices, "file"),
-            button("Save", "The samples of all axes, as a table", self.save, self.notice),
-        )
+        actions = []
+        for name, text, tip, press in (
+            ("file", "Save", "The samples of all axes, as a table", self.save),
+            ("send_to", "Send", "Send the table by e-mail; it is saved first", self.send),
+        ):
+            action = widgets.HBox([FieldView(self.work.choices, name), button(text, tip, press, self.notice)])
+            action.add_class("rds-action")
+            actions.append(action)
+        return row(*actions)
 
     def _arrange(self) -> None:
         """Show the fields that matter for what is chosen."""
@@ -127,6 +149,17 @@ class InterpolatorView:
         self._side.children = groups
         self.segments.layout.display = "" if "rows" in shown else "none"
         self.check_button.layout.display = "" if {"line_file", "arc_file"} & set(shown) else "none"
+        self._show_model()
+
+    def _show_model(self) -> None:
+        """The block diagram of what is chosen, where it is looked at."""
+        if not self.model_button.value:
+            self.model.value = ""
+            return
+        try:
+            self.model.value = diagram_svg(diagram(self.work))
+        except InputError as error:
+            self.model.value = f'<p role="alert">✖ {escape(str(error))}</p>'
 
     def _code(self) -> CodeView:
         if self._code_view is None:
@@ -174,6 +207,14 @@ class InterpolatorView:
         if self.done is not None:
             self.notice.say(f"saved as {self.work.save(self.done)}", "good")
 
+    def send(self) -> None:
+        """What the send button does."""
+        done = self.done
+        if done is not None:
+            follow(
+                self.bar, self.notice, lambda: self.work.send(done), lambda sentence: self.notice.say(sentence, "good")
+            )
+
     def _follow(self, begin: Callable[[], Task[T]], show: Callable[[T], None], stopped: str) -> None:
         refused = [view.field.label for name, view in self._views.items() if name in self.work.shown and view.refused]
         if self.work.choices["given"] == "several":
@@ -203,6 +244,7 @@ class InterpolatorView:
         else:
             self.notice.say("done, but further from the path than one BLU: see the numbers", "warning")
         self.results.layout.display = ""
+        self._move(done)
         options = [(_PICTURES[name], name) for name in names_of(done)]
         kept = self.picture.value if self.picture.value in names_of(done) else "motion"
         with self.picture.hold_trait_notifications():
@@ -210,12 +252,30 @@ class InterpolatorView:
             self.picture.value = kept
         self._draw()
 
+    def _move(self, done: Interpolation) -> None:
+        """The machine goes along the samples; its trail is coloured by their distance from the programmed path."""
+        if self.scene is None:
+            return
+        apart = done.T if done.T >= _SEEN else _SEEN + done.T  # s; the stream leaves out what comes faster
+        drawn = np.linspace(0, done.samples, 1 + max(int(done.duration / apart + 1e-9), 1)).round().astype(int)
+        rows = np.column_stack([done.time, done.position, done.path_error])[drawn]
+        self.scene.begin([*((f"{axis}_reference", "mm") for axis in done.axes), ("contour_error", "mm")], live=False)
+        self.scene.add(rows)
+
     def _draw(self) -> None:
         from rds.interpolators.plots import picture
 
         done, name = self.done, self.picture.value
         if done is not None and name is not None:
             self.figure.draw(self.shell.session, self.shell.ticker, lambda: picture(done, name))
+
+
+def _scene(machine: str) -> MachineScene | None:
+    """The machine of the page; none where its file will not do, which interpolating does not need."""
+    try:
+        return MachineScene(load_machine(machine))
+    except InputError:
+        return None
 
 
 _FIRST = "<p>Choose a path on the left, then press Interpolate: motion, path and errors follow.</p>"

@@ -34,6 +34,7 @@ from rds.panels.interpolator.fields import (
     read_point,
 )
 from rds.panels.session.choices import Choices
+from rds.panels.session.email import mail_server, send_files
 from rds.panels.session.save_as import save_as
 from rds.panels.session.session import Session
 from rds.panels.session.task import Task
@@ -55,6 +56,7 @@ class Interpolating:
         self.choices: Choices = session.choices(PANEL, fields())
         self.builds = Builds()
         self.notes: list[str] = []
+        self._saved: tuple[Interpolation, Path] | None = None  # what was saved last, and where
         self._unit = self.choices["feed_unit"]
         if self._unit != "mm/min":
             self.choices.replace([feed(self._unit, self.choices["feed"])])
@@ -153,7 +155,28 @@ class Interpolating:
 
     def save(self, done: Interpolation) -> Path:
         """Save the samples under the name that is chosen; InputError where there is such a file already."""
-        return save_as(done.result(), self.session.folder, self.choices["file"])
+        path = save_as(done.result(), self.session.folder, self.choices["file"])
+        self._saved = done, path
+        return path
+
+    def send(self, done: Interpolation) -> Task[str]:
+        """Begin to send the samples by e-mail: the file they were saved as, or are saved as now.
+
+        InputError where that will not do, where nobody is named, and where no mail server is set up.
+        """
+        to = str(self.choices["send_to"])
+        if not to.strip():
+            raise InputError("say whom to send it to, as in name@example.edu")
+        server = mail_server(self.session.folder)
+        saved = self._saved is not None and self._saved[0] is done and self._saved[1].is_file()
+        path = self._saved[1] if saved and self._saved is not None else self.save(done)
+        text = f"{done!r}, sent from RDS.\n"
+
+        def work(task: Task[str]) -> str:
+            task.note = "sending"
+            return send_files(server, to, f"RDS: {path.stem}", text, [path], lambda: task.stopping)
+
+        return self.session.work("sending", work)
 
     def _single(self) -> str:
         return str(self.choices["segment"]) if len(self.roles) == 2 else self.roles[0]

@@ -68,6 +68,10 @@ def _link(link: Link, start: Block, end: Block, rows: int) -> str:
         middle = y0 + _HEIGHT / 2
         path = f"M{x0 + _WIDTH} {middle:g}H{x1}"
         label = _text((x0 + _WIDTH + x1) / 2, middle - 7, link.label, "")
+    elif end.row < start.row:  # from the second row back up, to under the block
+        under = x1 + _WIDTH / 2
+        path = f"M{x0 + _WIDTH} {y0 + _HEIGHT / 2:g}H{under:g}V{y1 + _HEIGHT}"
+        label = _text((x0 + _WIDTH + under) / 2, y0 + _HEIGHT / 2 - 7, link.label, "")
     else:
         down = y1 + _HEIGHT / 2
         path = f"M{x0 + _WIDTH / 2:g} {y0 + _HEIGHT}V{down:g}H{x1}"

@@ -13,7 +13,7 @@ from rds.nc.bundled import bundled
 from rds.nc.language.tool_library import is_library
 from rds.panels.equipment.build import Builds
 from rds.panels.interpolator.fields import USER
-from rds.panels.interpolator.motion import PLANNED, filter_of, idle_motion, motion_fields
+from rds.panels.interpolator.motion import OWN, PLANNED, filter_of, idle_motion, motion_fields
 from rds.panels.program.text import ProgramText, check_name, programs
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text, mode_choice
@@ -315,12 +315,17 @@ class Program:
             return {}, []
         own = []
         if name == USER:
-            path = (self.session.folder / str(chosen["interpolator_file"]).strip()).resolve()
-            if not path.is_file():
-                raise InputError(
-                    "the interpolator's file is not there; save it in your folder, and name it in Settings"
-                )
-            name, own = str(path), [("interpolator", path)]
+            named = [str(chosen[each]).strip() for each in OWN]
+            for text in named if named[1] else named[:1]:  # the second one, of arcs, need not be there
+                path = (self.session.folder / text).resolve()
+                if not path.is_file():
+                    raise InputError(
+                        "the interpolator's file is not there; save it in your folder, and name it in Settings"
+                    )
+                own.append(("interpolator", path))
+            name, *arcs = [str(path) for _, path in own]
+            both = {"interpolator": name, "arc_interpolator": arcs[0]} if arcs else name
+            return {"interpolator": both, **filter_of(chosen)}, own
         return {"interpolator": name, **filter_of(chosen)}, own
 
     def idle(self) -> set[str]:

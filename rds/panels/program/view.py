@@ -13,7 +13,7 @@ from rds.nc.run.run import Status
 from rds.nc.stepping import Step
 from rds.panels.equipment.result_view import timing_line
 from rds.panels.equipment.strip import StripChart, end_marks
-from rds.panels.interpolator.motion import MADE
+from rds.panels.interpolator.motion import MADE, OWN
 from rds.panels.kit.button import WAIT, attempt, is_free, say_error
 from rds.panels.kit.field import FieldView, field_group
 from rds.panels.kit.html import Html
@@ -76,7 +76,7 @@ class ProgramView:
 
     def _arranged(self) -> widgets.Widget:
         choices = self.program.choices
-        self._motion = {name: FieldView(choices, name) for name in ("interpolator", "interpolator_file", *MADE)}
+        self._motion = {name: FieldView(choices, name) for name in ("interpolator", *OWN, *MADE)}
         motion = widgets.VBox([*self._motion.values()])
         motion.add_class("rds-group")
         self._show_motion()

@@ -138,6 +138,12 @@ def check_address(text: str) -> str:
     return text
 
 
+def check_addresses(text: str) -> None:
+    """Addresses, separated by commas; InputError for the first that is none."""
+    for each in text.split(","):
+        check_address(each)
+
+
 def send_files(
     server: Server,
     to: str,
