@@ -46,7 +46,8 @@ def new(
         typer.Option(
             metavar="MACHINE",
             help="With a script or --scan, the machine that is reconfigured: what nobody says (models, limits, "
-            "converter, spindle) is its. By default of a machine of the package with such modules, or chosen.",
+            "converter, spindle) is its, and the links of a script that has RF02 and RF03 alone. By default of a "
+            "machine of the package with such modules, or chosen.",
         ),
     ] = None,
     interface: Interface = None,
@@ -73,7 +74,7 @@ def new(
             )
         if like is not None and modules is not None:
             raise InputError("--like belongs to a script or --scan; modules of the library are chosen whole")
-        _check_out(out, ".toml", force)
+        check_out(out, ".toml", force)
         before = load_machine(like) if like is not None else None
         if modules is not None:
             text = text_of_modules([each.strip() for each in modules.split(",")], out.stem)
@@ -81,7 +82,7 @@ def new(
             text = _scanned(out.stem, order, before, chosen_bus(interface, channel, experiment, bitrate))
         else:
             text = _from_file(script, out.stem, before)
-        _write(out, text)
+        write_made(out, text)
         judged = verdict(load_machine(str(out)))
     _show_verdict(judged, json, f"wrote {out}")
 
@@ -145,7 +146,7 @@ def show(
 
         made = load_machine(machine)
         path = out or Path(f"{made.name}.png")
-        _check_out(path, FORMATS, force or out is None)
+        check_out(path, FORMATS, force or out is None)
         write_whole(path, picture_file(made, path, _values(joints, "--joints") if joints else None))
         rooms = {within: workspace(made.kinematics, within) for within in ("travel", "limits")}
         singular = singularities(made.kinematics)
@@ -223,8 +224,8 @@ def urdf(
         from rds.machines import load_machine
         from rds.machines.urdf import urdf_text
 
-        _check_out(out, ".urdf", force)
-        _write(out, urdf_text(load_machine(machine)))
+        check_out(out, ".urdf", force)
+        write_made(out, urdf_text(load_machine(machine)))
     print_json({"file": str(out)}) if json else typer.echo(f"wrote {out}")
 
 
@@ -238,10 +239,10 @@ def script(
     """Write a machine's links as a configuration script (NCC)."""
     with refusals():
         from rds.machines import load_machine
-        from rds.machines.ncc import script_of
+        from rds.machines.ncc import script_of_machine
 
-        _check_out(out, ".ncc", force)
-        _write(out, script_of(load_machine(machine).kinematics))
+        check_out(out, ".ncc", force)
+        write_made(out, script_of_machine(load_machine(machine)))
     print_json({"file": str(out)}) if json else typer.echo(f"wrote {out}")
 
 
@@ -338,7 +339,7 @@ def _outside(names: tuple[str, ...], values: Any, limits: Any) -> str:
     return ""
 
 
-def _check_out(path: Path, ending: str | tuple[str, ...], force: bool) -> None:
+def check_out(path: Path, ending: str | tuple[str, ...], force: bool) -> None:
     from rds.core.errors import InputError
 
     if not path.name.endswith(ending):
@@ -348,7 +349,7 @@ def _check_out(path: Path, ending: str | tuple[str, ...], force: bool) -> None:
         raise InputError("there is such a file already; choose another name, or overwrite it with --force", str(path))
 
 
-def _write(path: Path, text: str) -> None:
+def write_made(path: Path, text: str) -> None:
     from rds.core.atomic import write_whole
 
     write_whole(path, text.encode())
