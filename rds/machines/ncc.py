@@ -314,7 +314,7 @@ def script_of_machine(machine: Machine) -> str:
     Of a machine that a script made (links LN1, LN2...) that script, with its limits and errors; else `script_of`.
     """
     links = machine.links[::-1]
-    carriers = [link.name for link in links[1:]] + [BED]
+    carriers = [*(link.name for link in links[1:]), BED][: len(links)]
     is_own = all(_is_of_script(link, n, by) for n, (link, by) in enumerate(zip(links, carriers, strict=True), 1))
     if not links or not is_own or machine.tool != ChainEnd("LN1") or machine.work != ChainEnd():
         return script_of(machine.kinematics)

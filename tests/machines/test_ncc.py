@@ -116,6 +116,7 @@ def test_a_script_is_written_of_any_machine(name: str) -> None:
     """Read again it gives the same poses, and the same verdict on its chain."""
     own = load_machine(name).kinematics
     again = machine_of_script(read_script(script_of(own)))
+    assert script_of_machine(load_machine(name)) == script_of(own)
     order = [own.joints[joint.number] for joint in reversed(own.chain.joints)]
     q = own.random(20)
     names = [name for link in reversed(again.links) if (name := link.axis)]

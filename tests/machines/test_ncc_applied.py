@@ -130,3 +130,15 @@ def test_another_chain_is_refused_with_what_differs(tmp_path: Path, script: str,
         check_program(path, load_machine(machine), NCC)
     with pytest.raises(RdsError, match=says):
         prepare(path, load_machine(machine), NCC)
+
+
+def test_a_machine_without_links_is_squared(tmp_path: Path) -> None:
+    """Half a degree between X and Y of the mini CNC: X makes good what Y leans."""
+    path = tmp_path / "own.ngc"
+    path.write_text("RF03 LN3 XA0 YA0 ZA0.5 X0 Y0 Z0\nBUILD\nG21 G90\nG1 X5 Y20 F100\nM2\n")
+    prepared = prepare(path, load_machine("mini-cnc"), NCC)
+    assert isinstance(prepared.program, Program)
+    end = dict(zip(prepared.program.axes, prepared.program.position[-1], strict=True))
+    lean = np.radians(0.5)
+    assert end["X"] - end["Y"] * np.sin(lean) == pytest.approx(5.0, abs=1e-6)
+    assert end["Y"] * np.cos(lean) == pytest.approx(20.0, abs=1e-6)
