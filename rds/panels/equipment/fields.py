@@ -13,6 +13,7 @@ from rds.core.quantities import Declaration, Quantity
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.machines import Axis, Machine
 from rds.modes.loop.mode import Drive
+from rds.nc.run.run import usual_controller
 from rds.panels.interpolator.motion import motion_fields
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text, field_of, labels, mode_choice
 from rds.panels.session.file_params import file_params
@@ -81,7 +82,7 @@ def first_fields(kind: str, machine: Machine, kept: object = None) -> Iterable[F
         "e.g. my_model.py",
     )
     if kind == "control":
-        yield controllers(axis)
+        yield controllers(machine, axis)
         yield Text(
             "controller_file", "File of the controller", "a Python file with control()", "", "e.g. my_controller.py"
         )
@@ -127,10 +128,11 @@ def _path_fields() -> Iterable[Field]:
     yield from motion_fields()
 
 
-def controllers(axis: Axis) -> Choice:
+def controllers(machine: Machine, axis: Axis) -> Choice:
     """The controllers that an axis can have: a spindle has nothing to observe, and no position loop."""
     fitting = [name for name in controller_names() if axis.unit != SPINDLE or name not in OF_POSITION]
-    first = "tracking" if "tracking" in fitting else "pid"
+    usual = usual_controller(machine)
+    first = usual if usual in fitting else "pid"
     options = labels(fitting, _CONTROLLERS) | {USER: "User-defined"}
     return Choice("controller", "Controller", "the law that answers with a voltage", first, options)
 
