@@ -24,7 +24,11 @@ JOINTS = "Joint values by name, as in X=10,A=30 (mm, degrees); joints that are n
 def new(
     out: Out,
     script: Annotated[
-        Path | None, typer.Argument(help="A configuration script (NCC), or a .urdf file.", metavar="SCRIPT")
+        Path | None,
+        typer.Argument(
+            help="A configuration script (.ncc), a part program that begins with one, or a .urdf file.",
+            metavar="SCRIPT",
+        ),
     ] = None,
     scan: Annotated[bool, typer.Option("--scan", help="From what the modules on the bus say (dialect oacs).")] = False,
     order: Annotated[
@@ -103,7 +107,8 @@ def _from_file(path: Path | None, name: str, before: Machine | None) -> str:
         if before is not None:
             raise InputError("--like belongs to a script or --scan; a .urdf file says all of its joints", str(path))
         return machine_text_of_urdf(text, name, str(path))
-    return machine_text_of_script(read_script(text, str(path)), name, before)
+    script = read_script(text, str(path), program=path.suffix.lower() != ".ncc")
+    return machine_text_of_script(script, name, before)
 
 
 def _scanned(name: str, order: str | None, before: Machine | None, place: ChosenBus) -> str:

@@ -203,11 +203,16 @@ class Script:
         return InputError(said, f"{self.name}, line {self.line}" if self.name else f"line {self.line}")
 
 
-def read_script(text: str, name: str = "") -> Script:
-    """The script in a text that holds nothing else; InputError with the line of what is wrong."""
+def read_script(text: str, name: str = "", *, program: bool = False) -> Script:
+    """The script in a text that holds nothing else; InputError with the line of what is wrong.
+
+    Of a `program` it is what stands at the head, before the first block.
+    """
     script, number = Script(name), 0
     for number, line in enumerate(text.splitlines(), 1):
         if not script.take(line, number):
+            if program and script.built:
+                break
             if not script.built and _MOTION.match(line):
                 script.check_built(number, f"{line.strip():.30}")
             script.line = number
