@@ -24,7 +24,11 @@ JOINTS = "Joint values by name, as in X=10,A=30 (mm, degrees); joints that are n
 def new(
     out: Out,
     script: Annotated[
-        Path | None, typer.Argument(help="A configuration script (NCC), or a .urdf file.", metavar="SCRIPT")
+        Path | None,
+        typer.Argument(
+            help="A configuration script (.ncc), a part program that begins with one, or a .urdf file.",
+            metavar="SCRIPT",
+        ),
     ] = None,
     scan: Annotated[bool, typer.Option("--scan", help="From what the modules on the bus say (dialect oacs).")] = False,
     order: Annotated[
@@ -46,7 +50,8 @@ def new(
         typer.Option(
             metavar="MACHINE",
             help="With a script or --scan, the machine that is reconfigured: what nobody says (models, limits, "
-            "converter, spindle) is its. By default of a machine of the package with such modules, or chosen.",
+            "converter, spindle) is its, and the links of a script that has RF02 and RF03 alone. By default of a "
+            "machine of the package with such modules, or chosen.",
         ),
     ] = None,
     interface: Interface = None,
@@ -73,7 +78,7 @@ def new(
             )
         if like is not None and modules is not None:
             raise InputError("--like belongs to a script or --scan; modules of the library are chosen whole")
-        _check_out(out, ".toml", force)
+        check_out(out, ".toml", force)
         before = load_machine(like) if like is not None else None
         if modules is not None:
             text = text_of_modules([each.strip() for each in modules.split(",")], out.stem)
@@ -81,7 +86,7 @@ def new(
             text = _scanned(out.stem, order, before, chosen_bus(interface, channel, experiment, bitrate))
         else:
             text = _from_file(script, out.stem, before)
-        _write(out, text)
+        write_made(out, text)
         judged = verdict(load_machine(str(out)))
     _show_verdict(judged, json, f"wrote {out}")
 
@@ -102,7 +107,8 @@ def _from_file(path: Path | None, name: str, before: Machine | None) -> str:
         if before is not None:
             raise InputError("--like belongs to a script or --scan; a .urdf file says all of its joints", str(path))
         return machine_text_of_urdf(text, name, str(path))
-    return machine_text_of_script(read_script(text, str(path)), name, before)
+    script = read_script(text, str(path), program=path.suffix.lower() != ".ncc")
+    return machine_text_of_script(script, name, before)
 
 
 def _scanned(name: str, order: str | None, before: Machine | None, place: ChosenBus) -> str:
@@ -145,7 +151,7 @@ def show(
 
         made = load_machine(machine)
         path = out or Path(f"{made.name}.png")
-        _check_out(path, FORMATS, force or out is None)
+        check_out(path, FORMATS, force or out is None)
         write_whole(path, picture_file(made, path, _values(joints, "--joints") if joints else None))
         rooms = {within: workspace(made.kinematics, within) for within in ("travel", "limits")}
         singular = singularities(made.kinematics)
@@ -223,8 +229,8 @@ def urdf(
         from rds.machines import load_machine
         from rds.machines.urdf import urdf_text
 
-        _check_out(out, ".urdf", force)
-        _write(out, urdf_text(load_machine(machine)))
+        check_out(out, ".urdf", force)
+        write_made(out, urdf_text(load_machine(machine)))
     print_json({"file": str(out)}) if json else typer.echo(f"wrote {out}")
 
 
@@ -238,10 +244,10 @@ def script(
     """Write a machine's links as a configuration script (NCC)."""
     with refusals():
         from rds.machines import load_machine
-        from rds.machines.ncc import script_of
+        from rds.machines.ncc import script_of_machine
 
-        _check_out(out, ".ncc", force)
-        _write(out, script_of(load_machine(machine).kinematics))
+        check_out(out, ".ncc", force)
+        write_made(out, script_of_machine(load_machine(machine)))
     print_json({"file": str(out)}) if json else typer.echo(f"wrote {out}")
 
 
@@ -338,7 +344,7 @@ def _outside(names: tuple[str, ...], values: Any, limits: Any) -> str:
     return ""
 
 
-def _check_out(path: Path, ending: str | tuple[str, ...], force: bool) -> None:
+def check_out(path: Path, ending: str | tuple[str, ...], force: bool) -> None:
     from rds.core.errors import InputError
 
     if not path.name.endswith(ending):
@@ -348,7 +354,7 @@ def _check_out(path: Path, ending: str | tuple[str, ...], force: bool) -> None:
         raise InputError("there is such a file already; choose another name, or overwrite it with --force", str(path))
 
 
-def _write(path: Path, text: str) -> None:
+def write_made(path: Path, text: str) -> None:
     from rds.core.atomic import write_whole
 
     write_whole(path, text.encode())

@@ -21,6 +21,7 @@ from rds.bus.tools.mf4 import put_off_asammdf
 from rds.cli import (
     analyse,
     bus,
+    calibrate,
     cutting,
     data,
     design,
@@ -127,6 +128,7 @@ machine_app.command("from")(design.machine_from)
 machine_app.command()(forces.power)
 for command in (machines.new, machines.show, machines.pose, machines.joints, machines.urdf, machines.script):
     machine_app.command()(command)
+machine_app.command()(calibrate.calibrate)
 machine_app.command("modules")(machines.modules)
 machine_app.command("watch")(machine_watch.watch)
 

@@ -19,7 +19,10 @@ def methods(
     machine: Annotated[
         str, typer.Option("--machine", help="A machine's name, or the path of its TOML file.")
     ] = "mini-cnc",
-    controller: Annotated[str, typer.Option(help="Of the position axes: a name, or your .py file.")] = "tracking",
+    controller: Annotated[
+        str | None,
+        typer.Option(help="Of the position axes: a name, or your .py file (default as of `rds nc run`)."),
+    ] = None,
     acceleration: Annotated[
         str | None, typer.Option(help="Filter on top of each: linear, exponential or s-shape.")
     ] = None,
@@ -39,8 +42,10 @@ def methods(
     with refusals():
         from rds.cli.interpolate import acceleration_of
         from rds.core.errors import InputError
+        from rds.machines import load_machine
         from rds.modes.experiment.folder import require_writable
         from rds.nc.run.methods import compare_methods, methods_report
+        from rds.nc.run.run import usual_controller
         from rds.results.reports.write import write
 
         if plant not in ("machine", "model"):
@@ -59,7 +64,8 @@ def methods(
                 as_built=plant == "machine",
                 progress=bar("methods"),
             )
-        settings = {"machine": machine, "plant": plant, "controller": controller, "acceleration": acceleration}
+        law = controller or usual_controller(load_machine(machine))
+        settings = {"machine": machine, "plant": plant, "controller": law, "acceleration": acceleration}
         made = methods_report(compared, file, settings)
         files = write(made, out) if out is not None else []
     if json:

@@ -30,6 +30,16 @@ class Folder:
             raise InputError(f"file = {name!r} is no file in {self.path}")
         return found
 
+    def machine(self, name: str, key: str) -> str:
+        """A machine by its name, or the path of its file in the folder. InputError for any other file; see `file`."""
+        if name.endswith(".toml"):
+            found = self.file(name)
+            self.check_words(found)
+            return str(found)
+        if "/" in name or "\\" in name:
+            raise InputError(f"{key} = {name!r} must be the name of a machine, or a .toml file in the folder")
+        return name
+
     def new_file(self, name: str, suffix: str) -> Path:
         """Where a new file of this name goes. InputError for one that is there, or would be outside of the folder."""
         found = self._named(name)

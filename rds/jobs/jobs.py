@@ -61,12 +61,7 @@ class Jobs:
         if experiment is not None:
             words = self.folder.file(experiment)
             self.folder.check_words(words)
-        if machine is not None and machine.endswith(".toml"):
-            found = self.folder.file(machine)
-            self.folder.check_words(found)
-            machine = str(found)
-        elif machine is not None and ("/" in machine or "\\" in machine):
-            raise InputError(f"machine = {machine!r} must be the name of a machine, or a .toml file in the folder")
+        machine = None if machine is None else self.folder.machine(machine, "machine")
         return PartProgram(file, machine, experiment=words, mode=mode or (None if words else DEFAULT))
 
     def job(self, number: int) -> Job:

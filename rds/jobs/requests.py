@@ -31,7 +31,11 @@ VERBS: dict[str, Table] = {
     "check": Table("the same, and forget it", _FILE, needed=("file",)),
     "configure": Table(
         "a machine from a configuration script (NCC), judged; a new file in the folder where it is a machine",
-        {"script": Text("the script, its lines from RF01 to BUILD"), "file": Text("the new file, as in mine.toml")},
+        {
+            "script": Text("the script, its lines from RF01 to BUILD"),
+            "file": Text("the new file, as in mine.toml"),
+            "like": Text("the machine that is reconfigured: a machine's name, or a file in the folder"),
+        },
         needed=("script", "file"),
     ),
     "run": Table(
@@ -110,16 +114,18 @@ def _check(jobs: Jobs, **words: Any) -> dict[str, Any]:
     return jobs.load(words["file"], words["mode"], words["machine"], words["experiment"], keep=False).about()
 
 
-def _configure(jobs: Jobs, script: str, file: str) -> dict[str, Any]:
+def _configure(jobs: Jobs, script: str, file: str, like: str | None) -> dict[str, Any]:
     from rds.core.atomic import write_whole
+    from rds.machines import load_machine
     from rds.machines.configuration import verdict
     from rds.machines.ncc import machine_of_script, machine_text_of_script, read_script
 
     place = jobs.folder.new_file(file, ".toml")
+    before = None if like is None else load_machine(jobs.folder.machine(like, "like"))
     read = read_script(script, "script")
-    judged = verdict(machine_of_script(read, place.stem))
+    judged = verdict(machine_of_script(read, place.stem, before))
     if judged.ok:
-        write_whole(place, machine_text_of_script(read, place.stem).encode())
+        write_whole(place, machine_text_of_script(read, place.stem, before).encode())
     return {"file": jobs.folder.relative(place) if judged.ok else None, "verdict": judged.to_json()}
 
 

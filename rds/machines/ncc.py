@@ -6,13 +6,14 @@
     N006 RF03 LN1 XA0 YA0 ZA0 X0 Y0 Z-5       assembly error, added to the link's numbers
     N008 BUILD
 
-LN1 holds the tool, the last link the work: T = Mn ... M2 M1.
+LN1 holds the tool, the last link the work: T = Mn ... M2 M1. A script without RF01 changes limits and errors of a
+machine that is there, whose links `script_of_machine` numbers.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import count
 from typing import Any
@@ -24,7 +25,7 @@ from rds.core.toml_table import TomlTable
 from rds.core.toml_text import toml_text
 from rds.machines.kinematics.kinematics import Kinematics
 from rds.machines.kinematics.transform import numbers_of, transformation
-from rds.machines.link_table import ENTRIES, ROTARY
+from rds.machines.link_table import BED, ENTRIES, ROTARY, ChainEnd, Link
 from rds.machines.machine import MACHINE, VOLTAGE_RANGE, Machine, machine_from
 from rds.machines.mounting import SPEED, axis_table, chosen_motion
 
@@ -36,6 +37,7 @@ _MOTION = re.compile(rf"\s*(?:N\d+(?:\.\d+)?)?\s*[A-Z]\s*{_NUMBER}", re.IGNORECA
 _WANTED = {1: ("LN", *ENTRIES), 2: ("LN", "UP", "LW"), 3: ("LN", *ENTRIES)}
 _LETTERS = {"X": "XU", "Y": "YV", "Z": "ZW", "XA": "A", "YA": "B", "ZA": "C"}  # of the axes, as they are taken
 _SAYS = "write RF01 (a link), RF02 (limits), RF03 (assembly error) or BUILD"
+_ALONE = "RF02 and RF03 alone change a machine that is there: name it (`like`), or write the links (RF01) before them"
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,8 @@ class Script:
     links: list[ScriptLink] = field(default_factory=list)  # LN1, LN2...
     built: int = 0  # line of the BUILD that everything before it counts in; 0: changed since
     line: int = 0  # read last
+    changes: list[tuple[int, int, dict[str, str]]] = field(default_factory=list)  # without RF01: line, RF word, words
+    of: str = ""  # the machine whose links these are; empty: the script's own
 
     def take(self, text: str, number: int) -> bool:
         """Read a line; False if it is none of a script (then nothing has changed). InputError for one that is wrong."""
@@ -103,10 +107,13 @@ class Script:
             raise self._error(f"RF{which:02d} has no word {more[0]}; it has {' '.join(_WANTED[which])}")
         if not words["LN"].isdigit() or int(words["LN"]) < 1:
             raise self._error(f"LN{words['LN']} must be a whole number from 1 on; LN1 holds the tool")
+        if which != 1 and not self.links:
+            self._change(which, words)
+            return
         number = int(words.pop("LN"))
         if which != 1 and number > len(self.links):
-            known = f"LN1 to LN{len(self.links)}" if self.links else "none yet"
-            raise self._error(f"there is no link LN{number} ({known}); write its RF01 first")
+            remedy = f"`rds machine script {self.of}` lists them" if self.of else "write its RF01 first"
+            raise self._error(f"there is no link LN{number} (LN1 to LN{len(self.links)}); {remedy}")
         if which == 1:
             self._link(number, words)
         elif which == 2:
@@ -114,7 +121,41 @@ class Script:
         else:
             self._correct(number, words)
 
+    def _change(self, which: int, words: dict[str, str]) -> None:
+        """A word for a link of a machine that is there; limits take effect at once, errors with the next BUILD."""
+        if which == 2:
+            self._range(words)
+        for word in _WANTED[which][1:]:
+            self._plain(word, words)
+        counts = which == 2 and (self.built or not self.changes)
+        self.built = self.line if counts else 0
+        self.changes.append((self.line, which, words))
+
+    def over(self, machine: Machine) -> Script:
+        """The links of `machine` with what this script, which has none of its own, changes of them.
+
+        InputError with the line of a word that fits none of them.
+        """
+        own = [replace(link, line=0, error_line=0) for link in read_script(script_of_machine(machine)).links]
+        made = Script(self.name, own, 1, of=machine.name)
+        for line, which, words in self.changes:
+            self.line = made.line = line
+            made._reconfigure(which, dict(words))
+        made.built = self.built
+        return made
+
+    @property
+    def corrects(self) -> bool:
+        """Whether it says an assembly error."""
+        said = (words for _, which, words in self.changes if which == 3)
+        return any(any(link.errors) for link in self.links) or any(
+            float(words[word]) != 0.0 for words in said for word in ENTRIES
+        )
+
     def _link(self, number: int, words: dict[str, str]) -> None:
+        if self.changes:
+            line, which, _ = self.changes[0]
+            raise self._error(f"RF01 behind RF{which:02d} of line {line}; write all links before limits and errors")
         if number <= len(self.links):
             first = self.links[number - 1].line
             raise self._error(f"LN{number} is there already, from line {first}; name each link once")
@@ -130,11 +171,16 @@ class Script:
     def _limit(self, number: int, words: dict[str, str]) -> None:
         link = self.links[number - 1]
         if not link.variable:
-            raise self._error(f"LN{number} is fixed (line {link.line} has no #): limits belong to a joint; remove them")
+            where = f"in {self.of}" if self.of else f"line {link.line} has no #"
+            raise self._error(f"LN{number} is fixed ({where}): limits belong to a joint; remove them")
+        limits = self._range(words)
+        self.links[number - 1] = replace(link, limits=limits)  # in force without BUILD: the chain is the same
+
+    def _range(self, words: dict[str, str]) -> tuple[float, float]:
         lower, upper = (self._plain(word, words) for word in ("LW", "UP"))
         if not lower < upper:
             raise self._error(f"UP{upper:g} must be more than LW{lower:g}; exchange them")
-        self.links[number - 1] = replace(link, limits=(lower, upper))  # in force without BUILD: the chain is the same
+        return lower, upper
 
     def _correct(self, number: int, words: dict[str, str]) -> None:
         errors = tuple(self._plain(word, words) for word in ENTRIES)
@@ -149,7 +195,7 @@ class Script:
     def _build(self, words: dict[str, str]) -> None:
         if words:
             raise self._error(f"BUILD stands alone; remove {next(iter(words))}")
-        if not self.links:
+        if not self.links and not self.changes:
             raise self._error("BUILD without links: write RF01 LN1 first, the link that holds the tool")
         self.built = self.line
 
@@ -157,33 +203,56 @@ class Script:
         return InputError(said, f"{self.name}, line {self.line}" if self.name else f"line {self.line}")
 
 
-def read_script(text: str, name: str = "") -> Script:
-    """The script in a text that holds nothing else; InputError with the line of what is wrong."""
+def read_script(text: str, name: str = "", *, program: bool = False) -> Script:
+    """The script in a text that holds nothing else; InputError with the line of what is wrong.
+
+    Of a `program` it is what stands at the head, before the first block.
+    """
     script, number = Script(name), 0
     for number, line in enumerate(text.splitlines(), 1):
         if not script.take(line, number):
+            if program and script.built:
+                break
             if not script.built and _MOTION.match(line):
                 script.check_built(number, f"{line.strip():.30}")
             script.line = number
             raise script._error(f"{line.strip():.30} is no line of a configuration script; {_SAYS}")
-    if not script.links:
+    if not script.links and not script.changes:
         raise script._error("there is no link; write RF01 LN1 ..., and BUILD at its end")
     script.check_built(number, "the end of the script")
     return script
 
 
-def machine_of_script(script: Script, name: str = "script") -> Machine:
-    """The machine of a script, not yet in a file. InputError for a joint without limits."""
-    return machine_from(TomlTable(_table(script, name), MACHINE))
+def machine_of_script(script: Script, name: str = "script", before: Machine | None = None) -> Machine:
+    """The machine of a script, not yet in a file; `before` as for `machine_text_of_script`.
+
+    InputError for a joint without limits.
+    """
+    table = _table(script, name) if before is None else _completed(script, name, before)
+    return machine_from(TomlTable(table, MACHINE))
 
 
 def machine_text_of_script(script: Script, name: str, before: Machine | None = None) -> str:
     """The machine's file, as TOML.
 
     What the script does not say (encoders, models, limits of planned motion, spindles, converter) is that of the axes
-    of the same name of `before`, the machine that is reconfigured, else chosen.
+    of the same name of `before`, the machine that is reconfigured, else chosen. A script without links is about those
+    of `before`.
     """
-    table = _table(script, name)
+    of = "" if before is None else f", but for what {before.name} has of axes with the same name"
+    about = (
+        f"A machine configured by the script {script.name or name}. Links are listed from the work on; LN1 holds "
+        f"the tool.\nNodes, encoders, models and limits of planned motion are chosen{of}."
+    )
+    return toml_text(_completed(script, name, before), about)
+
+
+def _completed(script: Script, name: str, before: Machine | None) -> dict[str, Any]:
+    """The machine's tables with what the script does not say."""
+    names: Sequence[str] = ()
+    if before is not None and script.changes:
+        script, names = script.over(before), joints_of(before.kinematics)
+    table = _table(script, name, names)
     axes, known = table["axis"], {} if before is None else before.axes
     if before is not None:
         table |= {"sample_period": before.sample_period, "converter": asdict(before.converter)}
@@ -205,15 +274,18 @@ def machine_text_of_script(script: Script, name: str, before: Machine | None = N
             raise script._error(f"{said}; mend RF02")
         link["limits"] = [low, high]
         axes[axis] = chosen_motion(SPEED, full) | axis_table(own)
-    of = "" if before is None else f", but for what {before.name} has of axes with the same name"
-    about = (
-        f"A machine configured by the script {script.name or name}. Links are listed from the work on; LN1 holds "
-        f"the tool.\nNodes, encoders, models and limits of planned motion are chosen{of}."
-    )
-    return toml_text(table, about)
+    return table
 
 
-def _table(script: Script, name: str) -> dict[str, Any]:
+def joints_of(kinematics: Kinematics) -> list[str]:
+    """The axes of the joints in the order of the chain, from the work on."""
+    return [kinematics.joints[joint.number] for joint in kinematics.chain.joints]
+
+
+def _table(script: Script, name: str, names: Sequence[str] = ()) -> dict[str, Any]:
+    """The machine's tables. `names` are the axes of the joints from the work on, where they have names already."""
+    if script.changes:
+        raise script._error(_ALONE)
     axes: dict[str, Any] = {}
     links = []
     for number, link in reversed(list(enumerate(script.links, 1))):
@@ -222,7 +294,7 @@ def _table(script: Script, name: str) -> dict[str, Any]:
             script.line = link.line
             if link.limits is None:
                 raise script._error(f"LN{number} moves and has no limits; write RF02 LN{number} UP... LW...")
-            axis = axis_name(link.variable, axes)
+            axis = names[len(axes)] if names else axis_name(link.variable, axes)
             unit = "deg" if link.variable in ROTARY else "mm"
             axes[axis] = {"node": len(axes) + 2, "unit": unit, "travel": list(link.limits), "resolution": 0.001}
             table |= {"axis": axis, "joint": link.variable}
@@ -241,6 +313,40 @@ def axis_name(variable: str, taken: Iterable[str]) -> str:
     return next(name for name in names if name not in taken)
 
 
+def script_of_machine(machine: Machine) -> str:
+    """A script of a machine's chain, which numbers its links.
+
+    Of a machine that a script made (links LN1, LN2...) that script, with its limits and errors; else `script_of`.
+    """
+    links = machine.links[::-1]
+    carriers = [*(link.name for link in links[1:]), BED][: len(links)]
+    is_own = all(_is_of_script(link, n, by) for n, (link, by) in enumerate(zip(links, carriers, strict=True), 1))
+    if not links or not is_own or machine.tool != ChainEnd("LN1") or machine.work != ChainEnd():
+        return script_of(machine.kinematics)
+    lines, said = [f"({machine.name}: from the tool, LN1, to the work)"], []
+    for link in links:
+        numbers: list[float | str] = [*(link.angles or (0.0,) * 3), *(link.offset or (0.0,) * 3)]
+        if link.axis:
+            numbers[ENTRIES.index(link.joint)] = "#"
+        lines.append(f"RF01 {link.name} {words_of(numbers)}")
+        if link.axis:
+            lower, upper = link.limits or machine.axes[link.axis].travel
+            said.append(f"RF02 {link.name} UP{_shown(upper)} LW{_shown(lower)}")
+    for link in links:
+        errors = (*link.error_angles, *link.error_offset)
+        if any(errors):
+            said.append(f"RF03 {link.name} {words_of(errors)}")
+    return "\n".join([*lines, *said, "BUILD"]) + "\n"
+
+
+def _is_of_script(link: Link, number: int, parent: str) -> bool:
+    """Whether words of a script say all of this link."""
+    numbers = (*(link.angles or (0.0,) * 3), *(link.offset or (0.0,) * 3))
+    says_more = link.matrix is not None or link.module or link.sign != 1
+    zero = not link.axis or numbers[ENTRIES.index(link.joint)] == 0.0
+    return link.name == f"LN{number}" and link.parent == parent and zero and not says_more
+
+
 def script_of(kinematics: Kinematics) -> str:
     """A script of any machine's chain, from the tool to the work; read again it gives the same poses.
 
@@ -256,20 +362,25 @@ def script_of(kinematics: Kinematics) -> str:
         matrices.append(over @ fixed)
         variable = ("XA", "YA", "ZA")[joint.along] if joint.turns else "XYZ"[joint.along]
         links.append((variable, kinematics.limits[joint.number], kinematics.joints[joint.number]))
-    entries: list[tuple[list[str], Any, str]] = []
+    entries: list[tuple[Sequence[float | str], Any, str]] = []
     for place, matrix in enumerate(matrices):
         if np.abs(matrix - np.eye(4)).max() > 1e-12:
-            entries.append(([_shown(value) for value in numbers_of(matrix)], None, "fixed"))
+            entries.append((numbers_of(matrix), None, "fixed"))
         if place < len(links):
             variable, limits, name = links[place]
-            entries.append((["#" if word == variable else "0" for word in ENTRIES], limits, name))
+            entries.append((["#" if word == variable else 0.0 for word in ENTRIES], limits, name))
     lines, limited = [f"({kinematics.name}: from the tool, LN1, to the work)"], []
     for number, (values, limits, name) in enumerate(reversed(entries), 1):
-        words = " ".join(f"{word}{value}" for word, value in zip(ENTRIES, values, strict=True))
-        lines.append(f"RF01 LN{number} {words} ({name})")
+        lines.append(f"RF01 LN{number} {words_of(values)} ({name})")
         if limits is not None:
             limited.append(f"RF02 LN{number} UP{_shown(limits[1])} LW{_shown(limits[0])}")
     return "\n".join([*lines, *limited, "BUILD"]) + "\n"
+
+
+def words_of(values: Iterable[float | str]) -> str:
+    """The six numbers of a link, or #, behind their words."""
+    shown = (value if isinstance(value, str) else _shown(value) for value in values)
+    return " ".join(f"{word}{value}" for word, value in zip(ENTRIES, shown, strict=True))
 
 
 def _shown(value: float) -> str:

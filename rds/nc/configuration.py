@@ -16,7 +16,7 @@ from rds.machines import Machine
 from rds.machines.kinematics.kinematics import Kinematics
 from rds.machines.kinematics.tip import Tip
 from rds.machines.link_table import ENTRIES, Link
-from rds.machines.ncc import Script, ScriptLink, machine_of_script
+from rds.machines.ncc import Script, ScriptLink, joints_of, machine_of_script
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 
@@ -29,20 +29,26 @@ def configured(program: Path, machine: Machine, options: Dialect) -> tuple[Machi
     """The machine that the program is checked for and run on, and what is to be noted, by line.
 
     Its travel is narrowed to the limits of its links and by the script at the program's head, whose assembly errors
-    (RF03) it has. A script that is wrong changes nothing: that is said, by its line, where the program is read. Raises
-    ProgramError with what differs where the script's chain is not the machine's, and where it cannot be corrected for.
+    (RF03) it has. A script without links is about the machine's own. A script that is wrong changes nothing: that is
+    said, by its line, where the program is read. Raises ProgramError with what differs where the script's chain is not
+    the machine's, where a word fits none of its links, and where it cannot be corrected for.
     """
     machine = _within_limits(machine)
     script = _script(program) if options.ncc else None
     if script is None:
         return machine, []
     line = script.built
-    joints = [(number, link) for number, link in reversed(list(enumerate(script.links, 1))) if link.variable]
     name = machine.name
-    if not machine.links:
+    if script.changes:
+        try:
+            script = script.over(machine)
+        except InputError as error:
+            raise _error(program, script.line, str(error).removeprefix(f"{error.where}: ")) from None
+    elif not machine.links:
         raise _error(program, line, f"the machine {name} has no links to compare the script with; {_remedy(program)}")
+    joints = [(number, link) for number, link in reversed(list(enumerate(script.links, 1))) if link.variable]
     own = machine.kinematics
-    names = [own.joints[joint.number] for joint in own.chain.joints]
+    names = joints_of(own)
     if len(names) != len(joints):
         said = f"the script has {len(joints)} joints, and {name} has {len(names)} ({', '.join(names)} from the work)"
         raise _error(program, line, f"{said}; {_remedy(program)}")
@@ -51,7 +57,7 @@ def configured(program: Path, machine: Machine, options: Dialect) -> tuple[Machi
             is_a = "turns" if joint.turns else "shifts"
             said = f"LN{number} ({link.variable}#) is not the joint {axis} of {name}, which {is_a}"
             raise _error(program, link.line, f"{said}; {_remedy(program)}")
-    if said := _differs(script, own):
+    if not script.of and (said := _differs(script, own)):
         raise _error(program, line, f"the script's chain is not that of {name}: {said}; {_remedy(program)}")
     notes, axes = [], dict(machine.axes)
     for (number, link), axis in zip(joints, names, strict=True):
@@ -66,7 +72,7 @@ def configured(program: Path, machine: Machine, options: Dialect) -> tuple[Machi
             axes[axis] = replace(axes[axis], travel=(low, high))
             said = f"RF02 narrows the travel of {axis} (LN{number}) to {low:g} to {high:g} {axes[axis].unit}"
             notes.append(_error(program, link.line, said))
-    wrong = [(number, link) for number, link in enumerate(script.links, 1) if any(link.errors)]
+    wrong = [(number, link) for number, link in enumerate(script.links, 1) if any(link.errors) and link.error_line]
     for number, link in wrong:
         words = " ".join(f"{word}{value:g}" for word, value in zip(ENTRIES, link.errors, strict=True) if value)
         said = f"the motion is corrected for the assembly error that RF03 says of LN{number}, {words}"
@@ -86,7 +92,7 @@ def configured(program: Path, machine: Machine, options: Dialect) -> tuple[Machi
 def corrects(program: Path, options: Dialect) -> bool:
     """Whether a script at the program's head says assembly errors."""
     script = _script(program) if options.ncc else None
-    return script is not None and any(any(link.errors) for link in script.links)
+    return script is not None and script.corrects
 
 
 def _within_limits(machine: Machine) -> Machine:

@@ -140,7 +140,7 @@ def test_the_command_line_lists_each_part(parts: str) -> None:
 
 # The field of a panel that offers them, made by the panel's own function.
 FIELDS: dict[str, Callable[[Machine], Iterable[Field]]] = {
-    "controllers": lambda machine: [equipment.controllers(machine.axes["X"])],
+    "controllers": lambda machine: [equipment.controllers(machine, machine.axes["X"])],
     "signals": lambda machine: [equipment.shapes("control", ["X"])],
     "interpolators": lambda machine: [field for field in motion.motion_fields() if field.name == "interpolator"],
     "accelerations": lambda machine: [field for field in filter_fields("", 0.1) if field.name == "acceleration"],
@@ -191,7 +191,7 @@ def test_an_option_has_the_range_of_its_declaration(command: list[str], option: 
 
 def test_the_override_has_one_range_at_every_door() -> None:
     (channel,) = [each for each in program_channels() if each.name == OVERRIDE]
-    (field,) = [each for each in program_fields(ROOT) if each.name == "override"]
+    (field,) = [each for each in program_fields(ROOT, "pid") if each.name == "override"]
     assert isinstance(field, Number)
     assert (channel.low, channel.high) == (FEED_SHARE.low, FEED_SHARE.high)
     assert (field.low, field.high, field.default) == (FEED_OVERRIDE.low, FEED_OVERRIDE.high, FEED_OVERRIDE.default)

@@ -212,6 +212,11 @@ def test_a_configuration_script_comes_over_the_socket(serve: Serve) -> None:
     fixed = client.ask(do="configure", script=script.replace("X-80", "X0").replace("YA90", "YA0"), file="none.toml")
     assert fixed["ok"] and not fixed["verdict"]["ok"] and fixed["file"] is None, "turns the tool about itself"
     assert not (server.folder / "none.toml").exists()
+    told = client.ask(do="configure", script="RF02 LN3 UP90 LW-45", file="narrow.toml", like="own.toml")
+    assert told["ok"], "limits of a machine that is there, without its links"
+    assert load_machine(str(server.folder / "narrow.toml")).kinematics.limits.tolist() == [[-45.0, 90.0]]
+    alone = client.ask(do="configure", script="RF02 LN3 UP90 LW-45", file="more.toml")
+    assert "name it (`like`)" in alone["error"]
 
 
 def test_the_documents_client(alone: Path) -> None:

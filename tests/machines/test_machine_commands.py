@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from machines.machine_text import link, text
-from machines.test_ncc import PAPER
+from machines.test_ncc import ERRORS, PAPER
 from typer.testing import CliRunner, Result
 
 from rds.cli.main import app
@@ -26,6 +26,16 @@ def told(*words: str) -> dict:
     done = rds(*words, "--json")
     assert done.exit_code == 0, done.stderr
     return json.loads(done.stdout)
+
+
+def test_the_head_of_a_part_program_becomes_the_machine_that_runs_it() -> None:
+    """The whole example of mrm-control, section 5, which goes on with NC code in N009."""
+    Path("part.ngc").write_text(PAPER + ERRORS + "N009 G90 T1 F100\nG21 G1 C20\nM2\n")
+    assert told("machine", "new", "part.ngc", "-o", "own.toml")["ok"] is True
+    tip = told("machine", "pose", "own.toml", "--joints", "C=0")["position"]
+    assert tip == pytest.approx([-80.0 * 0.984807753, -80.0 * 0.173648178, 70.0 - 370.0 - 140.0])  # RF03: 10 degrees
+    Path("early.ngc").write_text(PAPER.replace("N005 BUILD\n", "") + "G21\nM2\n")
+    assert "line 5: G21 before BUILD" in rds("machine", "new", "early.ngc", "-o", "early.toml").stderr
 
 
 def test_a_script_becomes_a_machine_and_a_machine_a_script() -> None:

@@ -35,12 +35,20 @@ def test_its_links_are_read(tmp_path: Path) -> None:
 
 
 def test_its_script_is_the_paper_s_as_printed() -> None:
-    (script,) = (block.text for block in blocks("docs/machines.md") if block.language == "ncc")
+    script, _ = (block.text for block in blocks("docs/machines.md") if block.language == "ncc")
     for printed, text in ((0, script), (1, script.replace("YA90", "YA-90"))):
         matrix = machine_of_script(read_script(text)).kinematics.forward({"C": 0.0})
         matrix[2, 3] += 140.0 + 370.0  # of LN1 alone
         rows = [cells[printed + 1] for cells in re.findall(r"\| (\w+) row \| ([^|]*) \| ([^|]*) \|", TEXT)]
         assert [[float(n) for n in row.split()] for row in rows] == (matrix[:3].round(9) + 0.0).tolist()
+
+
+def test_its_job_changes_the_mill() -> None:
+    _, job = (block.text for block in blocks("docs/machines.md") if block.language == "ncc")
+    changed = machine_of_script(read_script(job), "job", load_machine("mrm-mill")).kinematics
+    assert changed.limits.tolist() == [[-50.0, 50.0], [-100.0, 100.0], [-100.0, 100.0]]
+    moved = changed.forward({})[:3, 3] - load_machine("mrm-mill").kinematics.forward({})[:3, 3]
+    np.testing.assert_allclose(moved, [0.02, 0.0, -0.15], atol=1e-12)
 
 
 def test_keys_checks_and_machines_are_named() -> None:

@@ -8,7 +8,7 @@ import pytest
 from rds.core.errors import InputError
 from rds.machines import load_machine, machine_names
 from rds.machines.configuration import verdict
-from rds.machines.ncc import machine_of_script, machine_text_of_script, read_script, script_of
+from rds.machines.ncc import machine_of_script, machine_text_of_script, read_script, script_of, script_of_machine
 
 PAPER = """\
 N001 RF01 LN1 XA0 YA90 ZA0 X-80 Y0 Z75
@@ -85,6 +85,9 @@ LINK = "RF01 LN1 XA0 YA0 ZA# X0 Y0 Z0\n"
         (PAPER + "G1 X5\n", 6, "G1 X5 is no line of a configuration script"),
         ("hello world\n" + PAPER, 1, "hello world is no line of a configuration script; write RF01"),
         (PAPER.replace("BUILD", "BUILD X1"), 5, "BUILD stands alone"),
+        ("RF02 LN3 UP1 LW1\n", 1, "UP1 must be more than LW1"),
+        ("RF02 LN3 UP1 LW-1\n" + PAPER, 2, "RF01 behind RF02 of line 1; write all links before limits"),
+        ("RF02 LN3 UP1 LW-1\n" + ERRORS.replace("N008 BUILD\n", ""), 3, "the end of the script before BUILD"),
         ("BUILD\n", 1, "BUILD without links"),
         ("", 0, "there is no link"),
     ],
@@ -113,6 +116,7 @@ def test_a_script_is_written_of_any_machine(name: str) -> None:
     """Read again it gives the same poses, and the same verdict on its chain."""
     own = load_machine(name).kinematics
     again = machine_of_script(read_script(script_of(own)))
+    assert script_of_machine(load_machine(name)) == script_of(own)
     order = [own.joints[joint.number] for joint in reversed(own.chain.joints)]
     q = own.random(20)
     names = [name for link in reversed(again.links) if (name := link.axis)]
@@ -127,3 +131,61 @@ def test_its_machine_file_says_what_the_script_said(tmp_path) -> None:
     machine = load_machine(str(path))
     assert [link.name for link in machine.links] == ["LN3", "LN2", "LN1"]
     np.testing.assert_allclose(machine.kinematics.forward({"C": 5.0}), equation_2(5.0, 10.0, 70.0), atol=1e-12)
+
+
+def made(tmp_path, name: str, script: str, before=None):
+    path = tmp_path / f"{name}.toml"
+    path.write_text(machine_text_of_script(read_script(script, f"{name}.ncc"), name, before))
+    return load_machine(str(path))
+
+
+def test_limits_and_errors_alone_change_a_machine_that_is_there(tmp_path) -> None:
+    """mrm-control, sections 5 and 6: RF02 and RF03 reconfigure without the chain constructed anew."""
+    own = made(tmp_path, "own", reversed_ln1(PAPER))
+    changed = made(tmp_path, "changed", "N001 RF02 LN3 UP90 LW-45\n" + ERRORS, own)
+    np.testing.assert_allclose(changed.kinematics.forward({"C": 5.0}), equation_2(5.0, 10.0, 70.0), atol=1e-12)
+    np.testing.assert_array_equal(changed.kinematics.limits, [[-45.0, 90.0]])
+    np.testing.assert_array_equal(changed.kinematics.travel, [[-180.0, 180.0]])
+    limited = made(tmp_path, "limited", "RF02 LN3 UP20 LW-20", changed)  # in force without BUILD; the errors stay
+    np.testing.assert_allclose(limited.kinematics.forward({"C": 5.0}), equation_2(5.0, 10.0, 70.0), atol=1e-12)
+    assert limited.kinematics.limits.tolist() == [[-20.0, 20.0]]
+
+
+def test_axes_keep_their_names_where_a_machine_is_changed(tmp_path) -> None:
+    """The joints of mrmt-oacs are called A, X and Z, and a script of its chain alone would call A C."""
+    before = load_machine("mrmt-oacs")
+    lines = script_of_machine(before).splitlines()
+    (limits,) = (line for line in lines if line.startswith("RF02") and "UP180 LW-180" in line)
+    changed = made(tmp_path, "narrow", limits.replace("UP180", "UP90"), before)
+    assert set(changed.kinematics.joints) == set(before.kinematics.joints)
+    assert changed.kinematics.limits[changed.kinematics.joints.index("A"), 1] == 90.0
+    q = before.kinematics.random(10)
+    order = [before.kinematics.joints.index(name) for name in changed.kinematics.joints]
+    np.testing.assert_allclose(changed.kinematics.forward(q[:, order]), before.kinematics.forward(q), atol=1e-9)
+    assert changed.axis("A").model == before.axis("A").model
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("RF02 LN9 UP1 LW-1", r"own.ncc, line 1: there is no link LN9 \(LN1 to LN7\); `rds machine script mrm-mill`"),
+        ("\nRF02 LN1 UP1 LW-1", "own.ncc, line 2: LN1 is fixed .in mrm-mill.: limits belong to a joint"),
+        ("RF02 LN6 UP900 LW800", "the limits of LN6 are outside the travel of X, -100 to 100; mend RF02"),
+    ],
+)
+def test_what_does_not_fit_the_machine_that_is_changed(text: str, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        machine_text_of_script(read_script(text, "own.ncc"), "own", load_machine("mrm-mill"))
+
+
+def test_changes_need_a_machine() -> None:
+    with pytest.raises(InputError, match="RF02 and RF03 alone change a machine that is there: name it"):
+        machine_of_script(read_script("RF02 LN3 UP90 LW-90"))
+
+
+def test_a_machine_of_a_script_gives_that_script_back(tmp_path) -> None:
+    own = made(tmp_path, "own", PAPER + ERRORS)
+    again = read_script(script_of_machine(own))
+    first = read_script(PAPER + ERRORS)
+    told = [(link.numbers, link.variable, link.limits, link.errors) for link in again.links]
+    assert told == [(link.numbers, link.variable, link.limits, link.errors) for link in first.links]

@@ -69,6 +69,41 @@ def test_the_motion_is_corrected_for_its_assembly_errors(tmp_path: Path) -> None
     assert abs(end["Z"]) > 4.0 and abs(end["X"] - 50.0) > 0.1, "without the correction 0 and 50"
 
 
+ALONE = "RF02 LN6 UP5 LW-100\n"
+
+
+@pytest.mark.parametrize("x, ok", [(4.9, True), (5.1, False)])
+def test_limits_alone_are_about_the_machine_that_runs(tmp_path: Path, x: float, ok: bool) -> None:
+    """mrm-control, section 6: the workspace is fitted to the operation, and the chain is not constructed anew."""
+    found, _ = check_program(program(tmp_path, ALONE, x), MILL, NCC)
+    assert found.ok == ok
+    notes = [str(each) for each in (*found.warnings, *found.faults)]
+    assert any(("RF02 narrows the travel of X (LN6) to -100 to 5 mm" if ok else "5.1") in note for note in notes)
+
+
+def test_errors_alone_correct_the_motion_on_the_machine_that_runs(tmp_path: Path) -> None:
+    errors = "RF03 LN1 XA0 YA0 ZA0 X0.2 Y0 Z-5\nRF03 LN4 XA0 YA0 ZA0.5 X0 Y0 Z0\nBUILD\n"
+    whole = prepare(program(tmp_path, SCRIPT.replace("BUILD\n", errors), 50.0), MILL, NCC).program
+    alone = prepare(program(tmp_path, errors, 50.0), MILL, NCC).program
+    assert isinstance(whole, Program) and isinstance(alone, Program)
+    np.testing.assert_allclose(alone.position[-1], whole.position[-1], atol=1e-9)
+    with pytest.raises(RdsError, match="G21 G90 before BUILD"):
+        prepare(program(tmp_path, errors.replace("BUILD\n", ""), 50.0), MILL, NCC)
+
+
+@pytest.mark.parametrize(
+    ("script", "says"),
+    [
+        ("\nRF02 LN9 UP5 LW-5\n", r"2: there is no link LN9 \(LN1 to LN7\); `rds machine script mrm-mill` lists them"),
+        ("RF02 LN1 UP5 LW-5\n", r"1: LN1 is fixed \(in mrm-mill\): limits belong to a joint"),
+        ("RF02 LN6 UP300 LW200\n", "outside the travel of X, -100 to 100"),
+    ],
+)
+def test_a_change_that_does_not_fit_the_machine_is_refused_by_its_line(tmp_path: Path, script: str, says: str) -> None:
+    with pytest.raises(RdsError, match=says):
+        check_program(program(tmp_path, script), MILL, NCC)
+
+
 def test_limits_of_links_are_those_of_programs(tmp_path: Path) -> None:
     links = tuple(replace(link, limits=(-5.0, 5.0)) if link.axis == "X" else link for link in MILL.links)
     narrow = replace(MILL, links=links)
@@ -95,3 +130,15 @@ def test_another_chain_is_refused_with_what_differs(tmp_path: Path, script: str,
         check_program(path, load_machine(machine), NCC)
     with pytest.raises(RdsError, match=says):
         prepare(path, load_machine(machine), NCC)
+
+
+def test_a_machine_without_links_is_squared(tmp_path: Path) -> None:
+    """Half a degree between X and Y of the mini CNC: X makes good what Y leans."""
+    path = tmp_path / "own.ngc"
+    path.write_text("RF03 LN3 XA0 YA0 ZA0.5 X0 Y0 Z0\nBUILD\nG21 G90\nG1 X5 Y20 F100\nM2\n")
+    prepared = prepare(path, load_machine("mini-cnc"), NCC)
+    assert isinstance(prepared.program, Program)
+    end = dict(zip(prepared.program.axes, prepared.program.position[-1], strict=True))
+    lean = np.radians(0.5)
+    assert end["X"] - end["Y"] * np.sin(lean) == pytest.approx(5.0, abs=1e-6)
+    assert end["Y"] * np.cos(lean) == pytest.approx(20.0, abs=1e-6)

@@ -73,6 +73,19 @@ def path(name: str) -> np.ndarray:
     return np.concatenate([block.segments for block in motion(program.path, load_machine(program.machine), Setup())])
 
 
+def test_the_programs_of_the_theses_are_for_their_machines() -> None:
+    assert {PROGRAMS[f"{name}.ngc"].machine for name in ("dcs-table-5-2", "face", "pyramid")} == {"starmill"}
+    assert PROGRAMS["oacs-p001.ngc"].machine == "mrmt-oacs"
+
+
+def test_stepper_axes_follow_rapids_within_two_steps_by_the_law_that_nobody_names() -> None:
+    """Table 5.2 of dcs-thesis at 1.2 m/min: an axis that is faster than a sample shows an observer no velocity."""
+    program = find_bundled("dcs-table-5-2")
+    result = PartProgram(program.path, program.machine).run("simulation")
+    assert result.meta["program"]["contour_error"]["max"] < 0.02  # mm; a step is 0.01
+    assert result["X_measured"][-1] == pytest.approx(0.0, abs=0.02)
+
+
 def test_the_shapes_are_what_their_titles_say() -> None:
     square = path("square")
     assert square["length"][~square["rapid"]] == pytest.approx([40.0] * 4)

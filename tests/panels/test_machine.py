@@ -102,3 +102,19 @@ def test_a_machine_is_put_together_by_hand(app: App, open_page: Callable[..., An
     press(page, "Write file")
     page.wait_for_selector('.rds-notice-good:visible:has-text("wrote by-hand.toml")')
     assert 'module = "oacs-range-arm"' in (app.folder / "by-hand.toml").read_text()
+
+
+def test_a_machine_is_made_of_a_script(app: App, open_page: Callable[..., Any]) -> None:
+    """Limits alone change the machine that is chosen at Modules."""
+    page = open_page("Machine")
+    tab(page, "Script")
+    text = page.locator("textarea:visible")
+    text.fill("RF02 LN1 UP5 LW")
+    press(page, "Check")
+    page.wait_for_selector('.rds-notice-error:visible:has-text("line 1: LW cannot be read")')
+    press(page, "Script of the machine")
+    page.wait_for_selector('.rds-notice-good:visible:has-text("this script makes a machine")')
+    page.locator(".rds-field:visible:has(.rds-label:has-text('Machine file')) input").fill("scripted.toml")
+    press(page, "Write machine")
+    page.wait_for_selector('.rds-notice-good:visible:has-text("wrote scripted.toml")')
+    assert "[[link]]" in (app.folder / "scripted.toml").read_text()

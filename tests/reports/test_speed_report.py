@@ -24,7 +24,7 @@ def test_the_step_to_1200_pulses_rises_in_400_ms_with_less_than_5_percent_oversh
     report, (row,) = rows(tmp_path, "speed_step.toml")
     _, start, level, rise, overshoot, mean, error = row
     assert (start, level) == (0.0, pytest.approx(1200.0))
-    assert rise == pytest.approx(0.4, abs=0.05)  # s; the paper's 400 ms
+    assert rise == pytest.approx(0.4, abs=0.01)  # s; the paper's 400 ms
     assert overshoot < 5.0
     assert mean == pytest.approx(1200.0, rel=0.005)  # the paper's mean error
     assert abs(error) < 0.5

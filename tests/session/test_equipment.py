@@ -65,6 +65,15 @@ def test_a_following_error_is_watched_where_one_is_given(tmp_path: Path) -> None
     assert "following_error" not in equipment.table()
 
 
+@pytest.mark.parametrize(("machine", "law"), [("mini-cnc", "tracking"), ("starmill", "pid")])
+def test_the_law_that_is_offered_first_suits_the_machine(tmp_path: Path, machine: str, law: str) -> None:
+    """A stepper follows within a sample of 10 ms, and shows the observer of tracking no velocity."""
+    equipment = Equipment(Session(tmp_path, machine), "control")
+    assert equipment.table()["controller"]["name"] == law
+    equipment.first_sine()
+    assert equipment.table()["controller"]["name"] == law
+
+
 @pytest.mark.parametrize("amplitude", [50.0, 300.0])  # rev/min: within an axis's range in mm, and beyond it
 def test_what_was_kept_for_a_spindle_is_there_when_the_page_is_opened_again(tmp_path: Path, amplitude: float) -> None:
     choose(Equipment(Session(tmp_path), "control"), system="spindle", amplitude=amplitude, offset=400.0)

@@ -63,6 +63,9 @@ class Bounds:
                     said = (
                         f"the configuration of {len(script.links)} links, built in line {script.built}, has no fault; "
                         "a machine that runs the program must have this chain (`rds machine new` makes one of a script)"
+                        if script.links
+                        else "limits and errors at the program's head are about the links of the machine that runs it "
+                        "(`rds machine script` numbers them)"
                     )
                     self._remark(ProgramError(said, file=source.name, line=script.built))
         except InputError as error:

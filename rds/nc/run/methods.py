@@ -23,6 +23,7 @@ from rds.modes.experiment import Experiment
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import InterpolatedProgram
 from rds.nc.run.path import SUFFIX
+from rds.nc.run.run import usual_controller
 from rds.results import Result
 from rds.results.reports.content import Report, Table
 
@@ -66,7 +67,7 @@ def compare_methods(
     own: Sequence[str | Path] = (),
     *,
     machine: str = "mini-cnc",
-    controller: Any = "tracking",
+    controller: Any = None,
     acceleration: Any = None,
     sample_period: float | None = None,
     as_built: bool = True,
@@ -75,7 +76,7 @@ def compare_methods(
     """Every method of the library, and the users' files `own`, along the path (or part program) in `file`, simulated.
 
     The axes are those behind the bus, with friction, play and the loop's sample of delay; without `as_built`, the
-    machine's model that controllers are designed for.
+    machine's model that controllers are designed for. Without `controller`, they have the law of part programs.
     A method that refuses a segment of the path (`circular` a line) says so in `refused`. InputError for what is wrong
     with the path, the machine or the words; ContractError for an own interpolator that breaks its interface.
     """
@@ -84,7 +85,9 @@ def compare_methods(
         raise InputError("there is no such path or part program; check the name and the folder", str(file))
     axes = list("XYZ") if path.suffix != SUFFIX else list("XYZ")[: len(read_segments(path)[0].start)]
     names = [*LIBRARY.names(), *map(str, own)]
-    of_axes = _as_built(load_machine(machine), axes, sample_period) if as_built else {}
+    loaded = load_machine(machine)
+    controller = usual_controller(loaded) if controller is None else controller
+    of_axes = _as_built(loaded, axes, sample_period) if as_built else {}
     found = []
     for number, name in enumerate(names):
         if progress is not None:

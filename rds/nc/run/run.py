@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from math import ceil, hypot
+from math import ceil, hypot, inf
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +33,19 @@ from rds.nc.run.prepare import SPINDLE_UNIT, Prepared, prepare
 from rds.nc.setup import Setup
 from rds.results import Result
 
-AXES_CONTROLLER = {"name": "tracking"}
 SPINDLE_CONTROLLER = {"name": "pid"}
 _BEGIN = Quantity("line of the program to begin at; 0: at its head", low=0, whole=True)
 _AHEAD = 1e-3  # s, over which the rate of the tip is taken
+
+
+def usual_controller(machine: Machine) -> str:
+    """The law of a machine's position axes where none is named.
+
+    It is `tracking`, whose observer takes the velocity from the positions of several samples. An axis that has followed
+    its voltage within one sample, as a pulse generator does, shows it none: then it is `pid`.
+    """
+    axes = [axis for axis in machine.axes.values() if not axis.is_spindle]
+    return "tracking" if all(axis.model.get("tau", inf) > machine.sample_period for axis in axes) else "pid"
 
 
 @dataclass(frozen=True)
@@ -195,7 +204,7 @@ class PartProgram(Experiment):
         table = words.table | {key: value for key, value in given.items() if value is not None}
         self._folder = Path.cwd() if experiment is None else Path(experiment).resolve().parent
         self._machine = _load(str(table.get("machine", "mini-cnc")), self._folder)
-        table.setdefault("controller", AXES_CONTROLLER)
+        table.setdefault("controller", {"name": usual_controller(self._machine)})
         self._table = table
         self._words = words.over_written(_with_spindle(table, self._machine))
         T = self._words.read("sample_period", self._machine.sample_period)

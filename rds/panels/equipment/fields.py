@@ -15,6 +15,7 @@ from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.machines import Axis, Machine
 from rds.modes.loop.following_error import LARGEST
 from rds.modes.loop.mode import Drive
+from rds.nc.run.run import usual_controller
 from rds.panels.interpolator.motion import motion_fields
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text, field_of, labels, mode_choice
 from rds.panels.session.file_params import file_params
@@ -84,7 +85,7 @@ def first_fields(kind: str, machine: Machine, kept: object = None) -> Iterable[F
         "e.g. my_model.py",
     )
     if kind == "control":
-        yield controllers(axis)
+        yield controllers(machine, axis)
         yield Text(
             "controller_file", "File of the controller", "a Python file with control()", "", "e.g. my_controller.py"
         )
@@ -140,10 +141,10 @@ def _path_fields() -> Iterable[Field]:
     yield from motion_fields()
 
 
-def controllers(axis: Axis) -> Choice:
-    """The controllers that an axis can have: a spindle has no position."""
+def controllers(machine: Machine, axis: Axis) -> Choice:
+    """The controllers that an axis can have, the usual one of its machine first: a spindle has no position."""
     fitting = [name for name in controller_names() if axis.unit != SPINDLE or is_for_spindle(name)]
-    first = "pid" if axis.unit == SPINDLE else "tracking"
+    first = "pid" if axis.unit == SPINDLE else usual_controller(machine)
     options = labels(fitting, _CONTROLLERS) | {USER: "User-defined"}
     return Choice("controller", "Controller", "the law that answers with a voltage", first, options)
 

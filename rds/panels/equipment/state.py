@@ -16,6 +16,7 @@ from rds.modes import SIMULATION, load_mode
 from rds.modes.experiment.experiment import Experiment
 from rds.modes.loop.plan import Plan
 from rds.modes.process.machine import BUILTIN
+from rds.nc.run.run import usual_controller
 from rds.panels.code.versions import keep_file
 from rds.panels.equipment.build import Builds, Checked
 from rds.panels.equipment.fields import (
@@ -49,7 +50,7 @@ from rds.panels.session.formula import formula_file
 from rds.panels.session.session import Session
 from rds.panels.session.task import Task
 
-FIRST_SINE = {"system": "X", "mode": SIMULATION, "shape": "sinusoid", "model": "default", "controller": "tracking"}
+FIRST_SINE = {"system": "X", "mode": SIMULATION, "shape": "sinusoid", "model": "default"}
 
 
 @dataclass
@@ -129,7 +130,7 @@ class Equipment:
 
     def first_sine(self) -> None:
         """The choices of a first experiment: a sine on X under the tracking controller, in simulation."""
-        for name, value in FIRST_SINE.items():
+        for name, value in (FIRST_SINE | {"controller": usual_controller(self.machine)}).items():
             if name in self.choices and _option(self.choices.fields[name], value):
                 self.choices.set(name, value)
         watched = (FERROR,) if FERROR in self.choices else ()
@@ -296,7 +297,7 @@ class Equipment:
         fields = self.choices.fields
         fitting = sizes(self.kind, self.machine, self.axis)
         self.choices.replace(each for each in [*fitting, shapes(self.kind, self.axes)] if each != fields[each.name])
-        if self.kind == "control" and (fitting_laws := controllers(self.axis)) != fields["controller"]:
+        if self.kind == "control" and (fitting_laws := controllers(self.machine, self.axis)) != fields["controller"]:
             self.choices.replace([fitting_laws])
         self._fit_signal()
         self.fit_parameters()

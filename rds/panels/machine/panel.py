@@ -11,6 +11,7 @@ from rds.panels.machine.configuration_view import ConfigurationView
 from rds.panels.machine.controllers_view import ControllersView
 from rds.panels.machine.library_view import LibraryView
 from rds.panels.machine.modules_view import ModulesView
+from rds.panels.machine.script_view import ScriptView
 from rds.panels.machine.state import MachineState
 
 NAME = "machine"
@@ -37,9 +38,10 @@ def build(shell: Any) -> widgets.Widget:
             controllers.widget,
             BusView(shell, state).widget,
             LibraryView(shell, state).widget,
+            ScriptView(shell, state).widget,
         ]
     )
-    for index, title in enumerate(("1 Modules", "2 Configuration", "3 Controllers", "Bus", "By hand")):
+    for index, title in enumerate(("1 Modules", "2 Configuration", "3 Controllers", "Bus", "By hand", "Script")):
         tabs.set_title(index, title)
     tabs.add_class("rds-tabs")
     return tabs

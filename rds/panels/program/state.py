@@ -11,6 +11,7 @@ from rds.core.shared_quantities import FEED_OVERRIDE
 from rds.machines import load_machine
 from rds.nc.bundled import bundled
 from rds.nc.language.tool_library import is_library
+from rds.nc.run.run import usual_controller
 from rds.panels.equipment.build import Builds
 from rds.panels.interpolator.fields import USER
 from rds.panels.interpolator.motion import OWN, PLANNED, filter_of, idle_motion, motion_fields
@@ -39,10 +40,10 @@ OPTIONS = {  # of the dialect: label and tooltip
 
 def program_choices(session: Session) -> Choices:
     """The choices about part programs: which is open, and how it is read and run."""
-    return session.choices(PANEL, _fields(session.folder))
+    return session.choices(PANEL, _fields(session.folder, usual_controller(load_machine(session.machine))))
 
 
-def _fields(folder: Path) -> Iterable[Field]:
+def _fields(folder: Path, controller: str) -> Iterable[Field]:
     found = programs(folder)
     yield Text("file", "Program", "the part program that is open", found[0] if found else FIRST, FIRST, 120, check_name)
     yield mode_choice("controller")
@@ -57,7 +58,7 @@ def _fields(folder: Path) -> Iterable[Field]:
         "controller",
         "Controller of the axes",
         "a name (tracking, feedforward, cascade, p, pid, modified-pid), or a Python file of yours; the spindle has PID",
-        "tracking",
+        controller,
         "tracking or my_controller.py",
         120,
     )
@@ -333,7 +334,7 @@ class Program:
         return idle_motion(self.choices.values())
 
     def _controller(self) -> tuple[Any, list[tuple[str, Path]]]:
-        name = str(self.choices["controller"]).strip() or "tracking"
+        name = str(self.choices["controller"]).strip() or usual_controller(self.machine)
         if not name.endswith(".py"):
             if self.choices["coupled"]:
                 raise InputError(f"the controller {name} is for single axes; a coupled one is a Python file of yours")
