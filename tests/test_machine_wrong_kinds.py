@@ -90,3 +90,9 @@ def test_the_command_says_the_same(tmp_path: Path) -> None:
     said = " ".join(done.stderr.split())
     assert done.returncode == 2 and "Traceback" not in said
     assert "own.toml, line 4: converter.bits = 2000 must be a whole number from 1 to 32" in said
+
+
+def test_an_experiment_in_a_machine_s_place_is_told_as_one() -> None:
+    file = Path(__file__).parents[1] / "examples" / "experiment.toml"
+    with pytest.raises(InputError, match=r"describes an experiment, not a machine.*Experiment\.from_toml"):
+        Experiment(file)

@@ -228,6 +228,10 @@ def load_machine(name: str | Path) -> Machine:
 
 def machine_from(table: TomlTable) -> Machine:
     """The machine that a table of a file describes; InputError where it describes none."""
+    if "machine" in table.table and "converter" not in table.table:
+        raise InputError(
+            "describes an experiment, not a machine; run it by `rds run` or rds.Experiment.from_toml", table.path
+        )
     tables = table.inner("axis")
     if tables is None or not tables.table:
         raise InputError("needs at least one [axis.NAME] table", table.path)
