@@ -17,7 +17,9 @@ from rds.bus.modules.dcs.port import SerialPort
 from rds.bus.modules.server_process import end_server, start_server
 from rds.core.errors import InputError, RdsError
 from rds.modes import EMULATION
+from rds.panels.page.shell import Shell
 from rds.panels.program.nodes import ByNodes
+from rds.panels.program.nodes_view import NodesView
 from rds.panels.program.state import Program
 from rds.panels.session import Session
 
@@ -92,6 +94,21 @@ def test_a_fault_of_the_program_is_said_and_the_machine_is_free_again(tmp_path: 
     run.start()
     assert run.wait(PATIENCE) and isinstance(run.error, RdsError) and "X900" in str(run.error)
     assert made.program.session.machine_user is None
+
+
+@pytest.mark.realtime
+def test_a_run_that_no_browser_shows_any_more_is_stopped(tmp_path: Path) -> None:
+    (tmp_path / "part.ngc").write_text(LONG)
+    shell = Shell(Session(tmp_path, "starmill"))
+    view = NodesView(shell, Program(shell.session))
+    view.by_nodes.program.choices.set("mode", "implementation")
+    view.button.click()
+    task = shell.session.tasks[-1]
+    shell.ticker.tick()
+    assert not task.stopping
+    shell.still_here.until = 0.0
+    shell.ticker.tick()
+    assert task.stopping and task.wait(PATIENCE) and task.stopped and shell.session.machine_user is None
 
 
 @pytest.mark.realtime

@@ -16,9 +16,10 @@ from rds.core.parallel.pipe import receive, send
 from rds.core.portable import portable
 from rds.modes import load_mode
 from rds.nc.run.node_methods import MOVES, check_methods, methods_of
+from rds.nc.run.serial_methods import FREE
 from rds.nc.run.serial_motion import MOTIONS
 from rds.nc.run.serial_report import WORDS
-from rds.panels.program.nodes_process import BEGINS, DONE, FAILED
+from rds.panels.program.nodes_process import BEGINS, DONE, FAILED, NOTE
 from rds.panels.program.nodes_run import CarriedOut, Order
 from rds.panels.program.state import Program
 from rds.panels.session.fields import Choice, Flag
@@ -27,7 +28,12 @@ from rds.panels.session.task import Stopped, Task
 
 PANEL = "program by the nodes"  # its name among the session's choices
 _FIRST = ("A", "B", "C")  # what is chosen to begin with
-_TOLD = WORDS | {MOVES: "from point to point, each by its own controller"}
+_OWN_CLOCK = "as {}, each node by its own clock"
+_TOLD = (
+    WORDS
+    | {f"{name}{FREE}": _OWN_CLOCK.format(name) for name in "BC"}
+    | {MOVES: "from point to point, each module by its own controller"}
+)
 _MOTION = {"plan": "planned", "constant": "constant feed, no ramps"}
 _ENDS_IN = 15.0  # s in which a process that is told to stop has stopped the nodes
 _PROGRAM = "rds.panels.program.nodes_process"
@@ -87,6 +93,7 @@ class NodesRun:
         self.order = Order(
             self.file, program.machine.path, program.setup(), tuple(methods), mode, motion, folder=self.folder
         )
+        self.notes: list[str] = []  # what of the program is not carried out, told before anything moves
         self._process: subprocess.Popen[bytes] | None = None
         self._task: Task[CarriedOut] | None = None
         self._since = 0.0  # s, of the monotonic clock: when what goes on now began
@@ -129,6 +136,8 @@ class NodesRun:
                 kind, *words = pickle.loads(receive(process.stdout))
                 if kind == BEGINS:
                     self._tell(task, *words)
+                elif kind == NOTE:
+                    self.notes.append(words[0])
                 elif kind == DONE:
                     return words[0]
                 elif kind == FAILED:
@@ -199,6 +208,11 @@ class NodesRun:
     def done(self) -> bool:
         """Whether it is over, and its report is written."""
         return self._task is not None and self._task.done
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it was asked to end."""
+        return self._task is not None and self._task.stopping
 
     @property
     def stopped(self) -> bool:

@@ -1,8 +1,8 @@
 """A part program on the nodes of a machine, in a process of its own: `python -m rds.panels.program.nodes_process`.
 
 What is to be done (`Order`) comes pickled on stdin; on stdout go pickled words: (BEGINS, what, share, s or None) now
-and then, and (DONE, how it was) or (FAILED, why) at the end. When stdin ends, somebody wants it to stop, or whoever
-gave the order has died: the nodes are told to stop, and nothing more is said.
+and then, (NOTE, what is not carried out), and (DONE, how it was) or (FAILED, why) at the end. When stdin ends, somebody
+wants it to stop, or whoever gave the order has died: the nodes are told to stop, and nothing more is said.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import pickle
 import signal
 import sys
 import threading
+from functools import partial
 from typing import Any
 
 from rds.core.errors import RdsError
@@ -26,7 +27,7 @@ from rds.core.portable import portable
 from rds.core.private_files import keep_process_private
 from rds.panels.program.nodes_run import carry_out
 
-BEGINS, DONE, FAILED = "begins", "done", "failed"
+BEGINS, NOTE, DONE, FAILED = "begins", "note", "done", "failed"
 
 
 def _interrupt_at_the_end(stdin: Any) -> None:
@@ -52,7 +53,7 @@ def main() -> None:
         order = pickle.loads(receive(sys.stdin.buffer))
         threading.Thread(target=_interrupt_at_the_end, args=(sys.stdin.buffer,), daemon=True).start()
         try:
-            made = carry_out(order, lambda what, share, seconds: say(BEGINS, what, share, seconds))
+            made = carry_out(order, partial(say, BEGINS), partial(say, NOTE))
         except RdsError as error:
             say(FAILED, str(error))
         except Exception as error:

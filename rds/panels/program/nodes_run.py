@@ -53,10 +53,11 @@ class CarriedOut:
         return methods_report(self.runs, self.file, self.settings)
 
 
-def carry_out(order: Order, say: Say) -> CarriedOut:
+def carry_out(order: Order, say: Say, tell: Callable[[str], None]) -> CarriedOut:
     """Do it, and write its report. Errors as of `run_together` and `run_moves`.
 
-    `say` hears what begins, how much is done (0 to 1), and the s that this takes, where it is known.
+    `say` hears what begins, how much is done (0 to 1), and the s that this takes, where it is known;
+    `tell`, before anything moves, what of the program is not carried out.
     """
     from rds.machines import load_machine
     from rds.nc.run.module_moves import run_moves
@@ -73,6 +74,7 @@ def carry_out(order: Order, say: Say) -> CarriedOut:
             *(file, machine, order.setup),
             mode=order.mode,
             channel=channel,
+            tell=tell,
             carried=lambda done, of: say("moving", done / of if of else 0.0, None),
         )
         made = CarriedOut(file, settings, moves=moves)
@@ -83,6 +85,7 @@ def carry_out(order: Order, say: Say) -> CarriedOut:
             mode=order.mode,
             motion=order.motion,
             channel=channel,
+            tell=tell,
             begins=lambda number, seconds: say(f"method {names[number]}", number / len(names), seconds),
         )
         made = CarriedOut(file, settings | {"motion": order.motion, **nodes.rate}, runs)

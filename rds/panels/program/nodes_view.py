@@ -23,7 +23,7 @@ from rds.results import html
 _WORDS = (
     "<p>Here no loop of this computer leads the axes: the nodes carry the program out by themselves, in the mode that "
     "is chosen above. The methods that are chosen run one after the other, and are compared. Stop tells the nodes to "
-    "stop; so does closing the page.</p>"
+    "stop, and so does a page that no browser shows any more.</p>"
 )
 _NONE = (
     "<p>No node of this machine carries programs out by itself: methods A, B and C need axes with stepper motors on a "
@@ -41,6 +41,7 @@ class NodesView:
         self.bar = WorkBar(shell.ticker)
         self.bar.stop_button.tooltip = "Tell the nodes to stop, and end the run; nothing of it is kept"
         self._results = widgets.VBox([])
+        self._run: NodesRun | None = None  # the last one
         if not self.by_nodes.methods:
             self.widget = widgets.VBox([Html(_NONE)])
             return
@@ -52,6 +53,17 @@ class NodesView:
         group = widgets.VBox([FieldView(choices, name) for name in (*self.by_nodes.methods, "motion")])
         group.add_class("rds-group")
         self.widget = widgets.VBox([Html(_WORDS), group, row(self.button), self.notice, self._results])
+        shell.ticker.add(self._look)
+
+    def _look(self) -> None:
+        """What moves with nobody there to stop it is stopped: in another page it can only be by an emergency stop."""
+        run = self._run
+        if run is None or run.done or run.stopping:
+            return
+        if run.notes:
+            self.notice.say("\n".join(run.notes))
+        if run.real_time and self._shell.still_here.gone:
+            run.stop()
 
     def _start(self) -> None:
         if not is_free(self.bar, self.notice):
@@ -59,6 +71,7 @@ class NodesView:
         self.notice.clear()
         run = self.by_nodes.run()
         run.start()
+        self._run = run
         self._clear()
         self.bar.follow(run, lambda: self._ended(run))
 
