@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import tempfile
 import time
@@ -16,6 +17,7 @@ from rds.bus.modules.dcs.host import Host
 from rds.bus.modules.dcs.port import SerialPort
 from rds.bus.modules.server_process import end_server, start_server
 from rds.core.errors import InputError, RdsError
+from rds.machines import load_machine
 from rds.modes import EMULATION
 from rds.panels.page.shell import Shell
 from rds.panels.program.nodes import ByNodes
@@ -50,6 +52,17 @@ def test_the_methods_are_those_that_suit_the_machine(tmp_path: Path) -> None:
     serial = by_nodes(tmp_path, "starmill", "A")
     assert serial.methods == ("A", "B", "C", "C-thesis", "B-free", "C-free")
     assert by_nodes(tmp_path, "mini-cnc", "A").methods == ("A", "B", "C", "B-free", "C-free", "moves")
+
+
+def test_a_machine_whose_nodes_have_no_method_says_why(tmp_path: Path) -> None:
+    text = Path(load_machine("three-axis-mill").path).read_text()
+    text = re.sub(r"node = (\d)", r"node = 2\1", text).replace('"linear-axis"', '"position-drive"')
+    text = re.sub(r"(?m)^(tau|K|friction_\w+) = .*$", "", text)
+    (tmp_path / "drives.toml").write_text(text)
+    shell = Shell(Session(tmp_path, str(tmp_path / "drives.toml")))
+    view = NodesView(shell, Program(shell.session))
+    assert view.by_nodes.methods == ()
+    assert "No node of this machine carries programs out by itself" in view.widget.children[0].value
 
 
 def test_what_cannot_run_is_refused_before_anything_begins(tmp_path: Path) -> None:
