@@ -13,13 +13,10 @@ import typer
 from rds.cli.common import print_json, progress_bars
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rds.nc.setup import Setup
     from rds.results.reports.content import Report
 
 _MACHINE = "starmill"
-_ALL = ("A", "B", "C", "C-thesis")  # what `all` stands for
 
 
 def run_methods(
@@ -41,15 +38,12 @@ def run_methods(
 
     InputError for words that are none; MachineError if a node or the bus fails.
     """
-    from functools import partial
-
     from rds.bus.tools.link import pair
     from rds.core.errors import InputError
     from rds.machines import load_machine
-    from rds.modes import DEFAULT, EMULATION
+    from rds.modes import DEFAULT
     from rds.modes.experiment.folder import require_writable
-    from rds.nc.run.serial_methods import METHODS, check_method, run_method
-    from rds.nc.run.serial_motion import BYTE_TIME, serial_motion
+    from rds.nc.run.node_methods import all_of, check_methods, nodes_of, run_together
     from rds.nc.run.serial_records import write_records
     from rds.nc.run.serial_report import methods_report
     from rds.results.reports.write import write
@@ -59,52 +53,26 @@ def run_methods(
     where, how = machine or _MACHINE, mode or DEFAULT
     words: dict[str, Any] = dict(map(pair, options))
     loaded = load_machine(where)
-    if any(axis.module.get("motor") for axis in loaded.axes.values()):
-        from rds.bus.hub.bus_settings import DEFAULT_BAUD
-
-        offered: tuple[str, ...] = METHODS
-        period, speed = BYTE_TIME, DEFAULT_BAUD if baud is None else baud
-        carry_out: Callable[..., Any] = partial(run_method, baud=speed)
-        rate = {"baud": speed}
-    else:
-        from rds.core.shared_quantities import SAMPLE_PERIOD
-        from rds.nc.run import can_methods
-
-        if baud is not None:
-            raise InputError(f"--baud is of a serial line, and {loaded.name} is on CAN: give --option bitrate=500000")
-        offered = can_methods.METHODS
-        period = SAMPLE_PERIOD.check(words.pop("period", loaded.sample_period), "period")
-        rate = {"bitrate": words.pop("bitrate", can_methods.BITRATE), "period": period}
-        carry_out = partial(can_methods.run_can_method, bitrate=rate["bitrate"])
-    names = [name for name in _ALL if name in offered and not (name == "C-thesis" and how == EMULATION)]
-    if methods != "all":
-        names = methods.split(",")
-    if unknown := [name for name in names if name not in offered]:
-        raise InputError(
-            f"--method {unknown[0]!r} is unknown; known: {', '.join(offered)}, several with commas, or all; moves alone"
-        )
-    for name in names:
-        check_method(name, how)
+    nodes = nodes_of(loaded, baud, words)
+    names = all_of(nodes, how) if methods == "all" else methods.split(",")
+    if unknown := [name for name in names if name not in nodes.methods]:
+        known = f"{', '.join(nodes.methods)}, several with commas, or all; moves alone"
+        raise InputError(f"--method {unknown[0]!r} is unknown; known: {known}")
+    check_methods(names, how)
     with progress_bars() as bar:
-        made = serial_motion(
-            file,
-            loaded,
-            setup,
+        show = bar("methods")
+        runs = run_together(
+            *(nodes, names, file, loaded, setup),
+            mode=how,
             motion=motion,
             synchronized=synchronized,
+            channel=channel,
             progress=bar("check"),
-            period=period,
-            whole=offered is METHODS,
+            begins=lambda number, _: show(number, len(names)),
+            tell=lambda note: typer.echo(f"rds: note: {note}", err=True),
         )
-        for note in made.notes:
-            typer.echo(f"rds: note: {note}", err=True)
-        show = bar("methods")
-        runs = []
-        for number, name in enumerate(names):
-            show(number, len(names))
-            runs.append(carry_out(name, made, loaded, mode=how, channel=channel, **words))
         show(len(names), len(names))
-    settings = {"machine": where, "mode": how, "motion": motion, **rate, **words}
+    settings = {"machine": where, "mode": how, "motion": motion, **nodes.rate, **nodes.options}
     report = methods_report(runs, file, settings)
     files = [*write(report, out), *write_records(runs, out)] if out is not None else []
     astray = any(any(run.astray.values()) for run in runs)

@@ -188,7 +188,7 @@ def test_a_simulation_ends_with_its_worst_lines(open_page: Callable[..., Any], a
     }""")
 
 
-def test_a_line_is_run_by_hand_the_work_is_touched_off_and_a_program_is_run_from_its_cursor(
+def test_a_program_is_run_from_its_cursor_and_by_the_nodes_a_line_by_hand_and_the_work_is_touched_off(
     open_page: Callable[..., Any], app: App
 ) -> None:
     page = opened(open_page)
@@ -202,6 +202,15 @@ def test_a_line_is_run_by_hand_the_work_is_touched_off_and_a_program_is_run_from
     page.click('button:text-is("Run from line")')
     page.wait_for_selector('.rds-main button:has-text("Line 3:")')
     assert not page.locator('.rds-main button:has-text("Line 2:")').count()
+
+    page.click('.lm-TabBar-tab:visible:has-text("Nodes")')
+    page.get_by_label("A: each period a frame").uncheck()
+    page.click('button:text-is("Run by the nodes")')
+    page.wait_for_selector('.rds-main p:has-text("keeps nearest to the path"):visible')
+    page.wait_for_selector('.rds-main td:text-is("C: cyclic buffer"):visible')
+    assert not page.locator('.rds-main td:text-is("A: each period a frame")').count()
+    page.wait_for_selector(".rds-main .jupyter-matplotlib canvas:visible, .rds-main .rds-figure img:visible")
+    assert list(app.folder.glob("runs/*-by-B-C-*/methods.html"))
 
     page.click('.lm-TabBar-tab:visible:has-text("MDI")')
     page.wait_for_selector('button:text-is("Run line"):enabled')

@@ -93,6 +93,30 @@ def test_a_host_that_dies_leaves_no_spindle_turning(bench: Maker, mode: str, lon
     assert abs(b.position(5)) < 1.0
 
 
+@pytest.mark.parametrize("method", ["B", "C"])
+def test_units_stand_where_the_host_is_interrupted(bench: Maker, method: str) -> None:
+    """They hold buffers of many seconds."""
+    b = bench(baud=115_200)
+    plain = b.port.sleep
+
+    def sleep(until: float) -> None:
+        if b.port.now() > 3.0:
+            b.port.sleep = plain  # type: ignore[method-assign]
+            raise KeyboardInterrupt
+        plain(until)
+
+    b.port.sleep = sleep  # type: ignore[method-assign]
+    with pytest.raises(KeyboardInterrupt):
+        if method == "B":
+            methods.method_b(b.host, {2: [segments.line(0.0, 900.0, 1500)]})
+        else:
+            methods.method_c(b.host, np.ones((1500, 1), np.int64), [2])
+    plain(b.port.now() + 0.5)
+    there = b.position(2)
+    plain(b.port.now() + 5.0)
+    assert 0.0 < there == b.position(2)
+
+
 def test_a_full_buffer_is_sent_nothing_that_it_cannot_take(bench: Maker) -> None:
     for method, size in (
         (lambda b: methods.method_c(b.host, steps(2400), UNITS), 1),

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import csv
 import secrets
-import tempfile
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from shutil import rmtree
@@ -28,11 +27,11 @@ from rds.bus.modules.rds.motion_frames import FINE, Buffer
 from rds.bus.modules.rds.motion_host import MotionHost
 from rds.bus.modules.rds.motion_port import CanPort, MotionPort, VirtualCan
 from rds.bus.tools.link import BUILTIN, bus_name, open_bus, standard_filters
-from rds.core.errors import InputError
+from rds.core.errors import InputError, MachineError
 from rds.machines import Machine
 from rds.machines.machine import Axis
 from rds.modes import EMULATION, SIMULATION
-from rds.nc.run.serial_methods import FREE, MethodRun, check_method, errors_from_path, segment_at
+from rds.nc.run.serial_methods import FREE, MethodRun, check_method, errors_from_path, gauges_file, segment_at
 from rds.nc.run.serial_motion import SerialMotion, by_equations
 
 METHODS = ("A", "B", "C", "B-free", "C-free")
@@ -124,7 +123,7 @@ def run_can_method(
         with ExitStack() as stack:
             port, where, trace = _bus(machine, interface, channel, bitrate, drift, options, stack)
             if trace is not None:
-                stack.callback(rmtree, trace.parent)
+                stack.callback(rmtree, trace.parent, ignore_errors=True)
             dry, _, _ = _carry_out(method, MotionHost(port, titles, where), motion, machine, dry=True)
         course = replace(simulation.course, late=dry.late, missing=dry.missing, retries=dry.retries)
         return replace(simulation, course=course)
@@ -157,7 +156,7 @@ def _bus(
     trace = None
     if channel is None and interface == BUILTIN:
         channel = f"{machine.name[:20]}-{secrets.token_hex(4)}"
-        trace = Path(tempfile.mkdtemp(prefix="rds-gauges-")) / "gauges.csv"
+        trace = stack.enter_context(gauges_file())
         said = ",".join(f"{name}:{ppm:g}" for name, ppm in drifts(drift or {}, machine).items())
         words = {"bitrate": bitrate, "trace": str(trace)} | ({"drift": said} if said else {})
         server = start_server("rds", machine.path, channel, words)
@@ -179,6 +178,19 @@ def _carry_out(
     method: str, host: MotionHost, motion: SerialMotion, machine: Machine, dry: bool = False
 ) -> tuple[Course, int, int]:
     """The course, and bits and bytes that went over the bus meanwhile."""
+    try:
+        return _carried_out(method, host, motion, machine, dry)
+    except MachineError:
+        raise
+    except BaseException:  # interrupted: method A's modules would go on for a while
+        with suppress(MachineError):
+            host.stop_all()
+        raise
+
+
+def _carried_out(
+    method: str, host: MotionHost, motion: SerialMotion, machine: Machine, dry: bool
+) -> tuple[Course, int, int]:
     period, nodes = motion.period, motion.units
     host.port.send(frames.SETUP, frames.encode_setup(period))
     if not dry:

@@ -107,8 +107,7 @@ def run_moves(
     and `tell`, before anything moves, what of the program is not.
     InputError for a mode or a program that move commands cannot carry out; MachineError if a module or the bus fails.
     """
-    if mode not in MODES:
-        raise InputError(f"method {METHOD} runs in {' and '.join(MODES)}: a move command has no dry run; not in {mode}")
+    check_mode(mode)
     blocks = list(compiled_form(file, machine, setup or Setup(), progress).blocks())
     rows = [row for block in blocks for row in block.segments]
     _require_points(rows, file)
@@ -152,6 +151,12 @@ def run_moves(
     accuracy = {name: modules[name].accuracy for name in dict.fromkeys(move.axis for move in done.moves)}
     told = {name: tuple(places) for name, places in done.told.items()}
     return MovesRun(tuple(done.moves), seconds, accuracy, tuple(notes), told)
+
+
+def check_mode(mode: str) -> None:
+    """InputError for a mode that move commands have not."""
+    if mode not in MODES:
+        raise InputError(f"method {METHOD} runs in {' and '.join(MODES)}: a move command has no dry run; not in {mode}")
 
 
 class _Carrier:

@@ -11,8 +11,8 @@ from __future__ import annotations
 import csv
 import secrets
 import tempfile
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shutil import rmtree
@@ -41,6 +41,7 @@ _REACH = 5.0  # mm from the reference that a carriage may be
 _APPROACH = 2  # BLU in 10 ms on the way to where the program starts
 _SETTLE = 0.2  # s after the last step
 _LINEAR = ("X", "Y", "Z")
+THESIS = "C-thesis"  # method C as the thesis has it: each byte of the host is a step, so that there is no dry run
 FREE = "-free"  # of methods B and C: each node goes by its own clock, which nobody corrects
 
 
@@ -69,7 +70,7 @@ def check_method(method: str, mode: str) -> None:
         raise InputError(f"method {method!r} is unknown; known: {', '.join(METHODS)}")
     if mode not in MODES:
         raise InputError(f"mode {mode!r} is none of {', '.join(MODES)}, in which units on a serial line run by methods")
-    if mode == EMULATION and method == "C-thesis":
+    if mode == EMULATION and method == THESIS:
         raise InputError(
             "method C-thesis has no dry run: each byte that its host sends is a step; take C, or simulation"
         )
@@ -118,9 +119,10 @@ def run_method(
         stack.callback(real.close)
         counted = _Counted(real)
         host = Host(counted, baud, titles, where)
-        _approach(host, motion)
-        counted.bytes = 0
-        course = _carry_out(method, host, motion, machine)
+        with host.stopping(hold=method == THESIS):
+            _approach(host, motion)
+            counted.bytes = 0
+            course = _carry_out(method, host, motion, machine)
         traffic = (counted.bytes, counted.bytes * 10 / baud)
         real.sleep(real.now() + _SETTLE)
         astray = _astray(method, host, motion, machine)
@@ -148,7 +150,7 @@ def _dry_run(
     with ExitStack() as stack:
         where, trace = _line(machine, channel, baud, line, stack)
         if trace is not None:
-            stack.callback(rmtree, trace.parent)
+            stack.callback(rmtree, trace.parent, ignore_errors=True)
         port = SerialPort(where, baud)
         stack.callback(port.close)
         host = Host(port, baud, titles, where)
@@ -186,10 +188,21 @@ def _line(
             raise InputError(f"{', '.join(line)} is for a line that the run starts itself; {channel} is there already")
         return channel, None
     where = channel if channel is not None else f"{machine.name[:20]}-{secrets.token_hex(4)}"
-    trace = Path(tempfile.mkdtemp(prefix="rds-gauges-")) / "gauges.csv"
+    trace = stack.enter_context(gauges_file())
     server = start_server("dcs", machine.path, where, {**line, "baud": baud, "trace": str(trace)})
     stack.callback(end_server, server)
     return where, trace
+
+
+@contextmanager
+def gauges_file() -> Iterator[Path]:
+    """A file for the readings of dial gauges, in a folder of its own, which goes if the block fails."""
+    folder = Path(tempfile.mkdtemp(prefix="rds-gauges-"))
+    try:
+        yield folder / "gauges.csv"
+    except BaseException:
+        rmtree(folder, ignore_errors=True)
+        raise
 
 
 def _approach(host: Host, motion: SerialMotion) -> None:
@@ -215,7 +228,7 @@ def _carry_out(method: str, host: Host, motion: SerialMotion, machine: Machine) 
     synchronize = not method.endswith(FREE)
     if method.startswith("B"):
         return on_line.method_b(host, nodes, synchronize=synchronize)
-    return on_line.method_c(host, pulses, units, as_thesis=method == "C-thesis", synchronize=synchronize)
+    return on_line.method_c(host, pulses, units, as_thesis=method == THESIS, synchronize=synchronize)
 
 
 def _astray(method: str, host: Host, motion: SerialMotion, machine: Machine) -> dict[str, int]:
@@ -272,7 +285,7 @@ def segment_at(method: str, motion: SerialMotion, course: Course, time: np.ndarr
         steps = np.cumsum(motion.counts)
         at = np.searchsorted(steps, time / motion.period, "right")
         return np.asarray(np.minimum(at, len(steps) - 1))
-    if method == "C-thesis":  # the host keeps the steps, and pauses between buffers
+    if method == THESIS:  # the host keeps the steps, and pauses between buffers
         made = np.searchsorted(np.asarray(course.instants) - course.begun, time, "right")
         return np.asarray(motion.segment[np.minimum(made, len(motion.segment) - 1)])
     share = np.clip(time / max(course.ended - course.begun, 1e-9), 0.0, 1.0)

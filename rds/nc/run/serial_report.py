@@ -34,7 +34,7 @@ _NOTE = (
     "buffers were filled. Load: share of the time in which the host's wires, or the CAN bus, are busy."
 )
 _LATE = 0.01  # share of late frames that is worth a sentence
-_WORDS = {
+WORDS = {
     "A": "each period a frame",
     "B": "equations of segments",
     "C": "cyclic buffer",
@@ -94,7 +94,7 @@ def _row(run: MethodRun) -> list[Any]:
     course = run.course
     error = run.error * 1e3 if len(run.error) else None
     return [
-        f"{run.method}: {_WORDS[run.method]}",
+        f"{run.method}: {WORDS[run.method]}",
         None if error is None else float(error.max()),
         None if error is None else float(np.sqrt(np.mean(error**2))),
         float(run.path_error.max() * 1e3) if len(run.path_error) else None,

@@ -96,8 +96,7 @@ class ResultActions:
         report = self._folder / self._sent[0] if self._folder is not None else None
         if report is None or not report.is_file():  # of a run that was cut short
             return ""
-        address = server_of(report.parent.parent).url(f"{report.parent.name}/{report.name}")
-        return f' · <a href="{escape(address)}" target="_blank" rel="noopener">Open the report</a>'
+        return f" · {report_link(report)}"
 
     def _made(self) -> widgets.HBox:
         choices = self._session.choices(
@@ -152,3 +151,9 @@ class ResultActions:
 
     def _succeeded(self, sentence: str) -> None:
         self.notice.say(sentence, "good")
+
+
+def report_link(report: Path) -> str:
+    """A link, as HTML, that opens a report in the folder of a run."""
+    address = server_of(report.parent.parent).url(f"{report.parent.name}/{report.name}")
+    return f'<a href="{escape(address)}" target="_blank" rel="noopener">Open the report</a>'

@@ -23,6 +23,7 @@ from rds.panels.page.keys import Keys
 from rds.panels.page.language import Language
 from rds.panels.page.presence import Presence
 from rds.panels.page.rescue import Rescue
+from rds.panels.page.still_here import StillHere
 from rds.panels.registry import PANELS
 from rds.panels.session.session import Message, Session
 
@@ -64,7 +65,8 @@ class Shell:
         self.colours = Colours(self._darken)
         self.presence = Presence(self._shown, lambda sentence: self.say(sentence, "warning"))
         self.language = Language(session)
-        unseen = [self.presence, self.colours, self.language, Keys(), Html(_style())]
+        self.still_here = StillHere()  # for what must not go on when the last browser has gone
+        unseen = [self.presence, self.still_here, self.colours, self.language, Keys(), Html(_style())]
         self.widget = widgets.VBox([*unseen, self._corner(), self._head(), self._notice, body, self._rescue])
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick

@@ -22,6 +22,7 @@ from rds.panels.program.check import Look
 from rds.panels.program.editor import Editor
 from rds.panels.program.files import ProgramFiles
 from rds.panels.program.mdi import Mdi
+from rds.panels.program.nodes_view import NodesView
 from rds.panels.program.operator import Operator
 from rds.panels.program.preview import Preview
 from rds.panels.program.result import ProgramResult
@@ -35,8 +36,8 @@ from rds.panels.program.tool_view import ToolView
 from rds.panels.scene.scene import MachineScene
 from rds.results import Result
 
-TABS = ("Preview", "Machine", "Result", "Steps", "Touch off", "MDI", "Settings, tools")
-PREVIEW, MACHINE, RESULT, STEP, SETUP, MDI, SETTINGS = range(len(TABS))
+TABS = ("Preview", "Machine", "Result", "Steps", "Touch off", "MDI", "Nodes", "Settings, tools")
+PREVIEW, MACHINE, RESULT, STEP, SETUP, MDI, NODES, SETTINGS = range(len(TABS))
 
 
 class ProgramView:
@@ -64,6 +65,7 @@ class ProgramView:
         self._at: dict[str, float] = {}  # where the axes were measured last
         self.setup = SetupView(self.program, lambda: self._at)
         self.mdi = Mdi(shell, self.program, self._begin, self.notice)
+        self.nodes = NodesView(shell, self.program)
         self.result = ProgramResult(shell, self.editor.go)
         self.steps = StepView(self.program, self._stepped, lambda: self.editor.caret)
         self.tools = ToolView(self.program)
@@ -86,11 +88,11 @@ class ProgramView:
         run = widgets.VBox([self.scene, self.strip])
         run.add_class("rds-live")
         pages = [self.preview.widget, run, self.result.widget, self.steps.widget, self.setup.widget]
-        pages += [self.mdi.widget, more]
+        pages += [self.mdi.widget, self.nodes.widget, more]
         self.tabs = widgets.Tab(pages, titles=TABS)
         self.tabs.add_class("rds-tabs")
         self.tabs.observe(self._turned, "selected_index")
-        left, right = widgets.VBox([self.editor]), widgets.VBox([self.status, self.tabs])
+        left, right = widgets.VBox([self.editor]), widgets.VBox([self.status, self.nodes.bar, self.tabs])
         left.add_class("rds-program-left")
         right.add_class("rds-main")
         columns = self._columns = widgets.HBox([left, right])
@@ -135,7 +137,8 @@ class ProgramView:
 
     def _turned(self, change: Any) -> None:
         # pictures are wider than what else stands beside the text
-        (self._columns.add_class if change["new"] == RESULT else self._columns.remove_class)("rds-program-wide")
+        wide = change["new"] in (RESULT, NODES)
+        (self._columns.add_class if wide else self._columns.remove_class)("rds-program-wide")
         if change["new"] == SETTINGS:
             self.tools.refresh()
         elif change["new"] == SETUP:

@@ -8,7 +8,8 @@ that has been reset meanwhile, ends the motion of all.
 from __future__ import annotations
 
 from binascii import crc_hqx
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from math import ceil
 
@@ -182,6 +183,18 @@ class Host:
         """JogStop: all units stand. `hold`: they carry a buffer out, where a single byte says so."""
         self.port.write(bytes([commands.STOP] * (3 if hold else 2)))
         self.port.sleep(self.port.now() + 3 * self._byte)
+
+    @contextmanager
+    def stopping(self, hold: bool = False) -> Iterator[None]:
+        """All units stand where the block is interrupted; `hold` as of `stop_all`."""
+        try:
+            yield
+        except MachineError:
+            raise  # whoever raised it has stopped them, as far as they can be reached
+        except BaseException:
+            with suppress(MachineError):
+                self.stop_all(hold)
+            raise
 
     def reset(self) -> None:
         """All units begin anew, as if they were switched on."""

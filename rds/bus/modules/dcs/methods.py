@@ -175,7 +175,7 @@ def cyclic(
 
     `data` are position bytes, or segments where `ends` says after which step each of them is over. Without
     `synchronize` each unit goes by its own clock. MachineError for a unit that resets, does not answer, or whose buffer
-    ran empty because the host was too slow; all units stand then.
+    ran empty because the host was too slow; all units stand then, and where it is interrupted.
     """
     feeds = [Feed(unit, each, None if ends is None else ends[unit]) for unit, each in data.items()]
     retries = host.counters.retries
@@ -196,7 +196,7 @@ def cyclic(
                 host.clock(begun)
                 clock += _CLOCK
             host.port.sleep(look)
-    except MachineError:
+    except BaseException:
         host.stop_all()
         raise
     course.retries = host.counters.retries - retries

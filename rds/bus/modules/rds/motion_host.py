@@ -182,7 +182,7 @@ class MotionHost:
         """Fill the buffers of modules that have begun, go, and refill them until all `steps` are made.
 
         `synchronize`: the modules' clocks are kept together. MachineError for a module that restarts, does not answer,
-        lets go of its axis, or whose buffer ran empty; all stand then.
+        lets go of its axis, or whose buffer ran empty; all stand then, and where it is interrupted.
         """
         feeds = [_Feed(node, each) for node, each in pieces.items()]
         self.retries = 0
@@ -193,7 +193,7 @@ class MotionHost:
             begun = self.port.now()
             course = Course(begun, begun + steps * period, steps)
             self._run(feeds, steps, begun if synchronize else None)
-        except MachineError:
+        except BaseException:
             self.stop_all()
             raise
         course.retries = self.retries
