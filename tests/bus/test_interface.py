@@ -140,6 +140,45 @@ def test_periodic_sending(opener: Opener) -> None:
     assert all(m is not None and m.arbitration_id == 7 for m in messages)
 
 
+@pytest.mark.parametrize("period", [0.0, -0.01, float("nan")])
+def test_a_period_that_is_none_is_refused(period: float) -> None:
+    with can.Bus("any", interface="rds") as sender, can.Bus("any", interface="rds") as receiver:
+        with pytest.raises(ValueError, match=r"period .* s must be more than 0; send\(\) sends once"):
+            sender.send_periodic(frame(7), period)
+        assert receiver.recv(0.05) is None
+
+
+@pytest.mark.parametrize(
+    "given, why",
+    [
+        ({"is_fd": True, "is_remote_frame": True}, "CAN FD has no remote frames; ask by a classic one"),
+        ({"is_remote_frame": True, "dlc": 1, "data": b"a"}, "a remote frame has no data, and this one 1 bytes"),
+        ({"arbitration_id": -1}, "identifier -1 is less than 0"),
+    ],
+)
+def test_a_frame_that_cannot_be_is_refused_with_the_reason(given: dict[str, Any], why: str) -> None:
+    message = frame(1)
+    for name, value in given.items():
+        setattr(message, name, value)
+    with can.Bus("any", interface="rds") as bus, pytest.raises(ValueError, match=why):
+        bus.send(message)
+
+
+def test_a_state_that_is_asked_for_is_refused() -> None:
+    with can.Bus("any", interface="rds") as bus:
+        with pytest.raises(NotImplementedError, match=r"cannot be set to BusState.PASSIVE: .* no node .* only listens"):
+            bus.state = can.BusState.PASSIVE
+        assert bus.state is can.BusState.ACTIVE
+
+
+def test_own_frames_come_back_marked(opener: Opener) -> None:
+    sender, receiver = opener(receive_own_messages=True), opener()
+    sender.send(frame(7))
+    own, others = sender.recv(10.0), receiver.recv(10.0)
+    assert own is not None and others is not None
+    assert (own.is_rx, others.is_rx) == (False, True) and own.timestamp == others.timestamp
+
+
 def test_notifier_thread(opener: Opener) -> None:
     sender, receiver = opener(), opener()
     listener = can.BufferedReader()

@@ -15,6 +15,7 @@ from uuid import uuid4
 
 import can
 import pytest
+from can.interfaces.slcan import slcanBus
 from typer.testing import CliRunner
 from waiting import wait_for
 
@@ -115,6 +116,32 @@ class Prioritizing:
         back = self.held.pop()
         back.is_rx = False
         return back
+
+
+def test_an_adapter_that_only_listens_sends_nothing(channel: str) -> None:
+    with (
+        can.Bus(interface="virtual", channel=channel) as other,
+        adapter(channel) as plugged,
+        slcanBus(plugged.path, listen_only=True, sleep_after_open=0.0, bitrate=500_000) as bus,
+    ):
+        wait_for(lambda: plugged.only_listens)
+        bus.send(message(0x123))
+        other.send(message(0x321))
+        heard = wait_for(lambda: bus.recv(0.1))
+        assert heard.arbitration_id == 0x321
+        assert bus.get_version(10.0) == (10, 13)  # said after the frame was looked at
+        assert other.recv(0.0) is None
+
+
+def test_a_bit_rate_may_be_told_by_registers(channel: str) -> None:
+    for rate, timing in (
+        (125_000, can.BitTiming(8_000_000, brp=4, tseg1=13, tseg2=2, sjw=1)),
+        (500_000, can.BitTiming(8_000_000, brp=1, tseg1=13, tseg2=2, sjw=1)),
+    ):
+        with adapter(channel) as plugged:
+            with can.Bus(interface="slcan", channel=plugged.path, timing=timing, sleep_after_open=0.0):
+                wait_for(lambda: plugged.is_open and plugged.bitrate)
+            assert plugged.bitrate == rate
 
 
 def test_a_frame_waits_until_the_one_before_it_is_on_the_wire() -> None:

@@ -164,6 +164,15 @@ def test_a_dbc_file_decodes_the_others(tmp_path: Path) -> None:
     assert command is not None and command.name == "command"
 
 
+def test_a_dbc_file_that_is_given_goes_before_our_own_messages(tmp_path: Path) -> None:
+    """The identifier 0x021 is a module's answer here; on a bus of somebody else's it is what their file says."""
+    path = tmp_path / "oven.dbc"
+    path.write_text('VERSION ""\nBU_: Oven\nBO_ 33 Door: 8 Oven\n SG_ Open : 0|8@1+ (1,0) [0|1] "" Oven\n')
+    ours, theirs = decoder()(frame(0x021, bytes(8))), decoder([path])(frame(0x021, bytes(8)))
+    assert ours is not None and ours.name.endswith("of module 1")
+    assert theirs is not None and theirs.name == "Door" and theirs.signals == {"Open": "0"}
+
+
 def test_what_is_no_dbc_file_is_refused(tmp_path: Path) -> None:
     pytest.importorskip("cantools")
     with pytest.raises(InputError, match="no such DBC"):

@@ -59,3 +59,29 @@ def test_a_node_id_that_cannot_be_is_refused() -> None:
     assert drive.ask(NODE_ID, 128) == bytes([NODE_ID, 1]) + bytes(6)
     drive.ask(GLOBAL, 0)
     assert drive.taken == []
+
+
+@pytest.mark.parametrize(
+    "address, answers",
+    [
+        ((0x319, 0x402, 0, 0xFFFFFFFF, 0, 0xFFFFFFFF), True),
+        ((0x319, 0x402, 0x10000, 0x10000, 77, 77), True),
+        ((0x318, 0x402, 0, 0xFFFFFFFF, 0, 0xFFFFFFFF), False),
+        ((0x319, 0x403, 0, 0xFFFFFFFF, 0, 0xFFFFFFFF), False),
+        ((0x319, 0x402, 0x10001, 0xFFFFFFFF, 0, 0xFFFFFFFF), False),
+        ((0x319, 0x402, 0, 0xFFFF, 0, 0xFFFFFFFF), False),
+        ((0x319, 0x402, 0, 0xFFFFFFFF, 78, 0xFFFFFFFF), False),
+        ((0x319, 0x402, 0, 0xFFFFFFFF, 0, 76), False),
+    ],
+)
+@pytest.mark.parametrize("node", [UNCONFIGURED, 9])
+def test_a_range_of_addresses_finds_the_drives_in_it(node: int, address: tuple[int, ...], answers: bool) -> None:
+    drive = Drive(node)
+    heard = [drive.ask(0x46 + part, number) for part, number in enumerate(address)]
+    assert heard == [None] * 5 + [bytes([0x4F]) + bytes(7) if answers else None]
+    assert not drive.slave.is_configuring
+
+
+def test_those_without_a_node_id_say_so() -> None:
+    assert Drive().ask(0x4C) == bytes([0x50]) + bytes(7)
+    assert Drive(9).ask(0x4C) is None

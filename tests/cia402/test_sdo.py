@@ -124,7 +124,8 @@ def upload_block(rig: Rig, block: int, lost: int | None = None) -> bytes:
     assert begun[0] == 0xC6 and int.from_bytes(begun[4:8], "little") == len(NAME)
     request, data = bytes([0xA3]) + bytes(7), b""
     while True:
-        heard, last = [], False
+        heard: list[bytes] = []
+        last = False
         for _, answer in rig.send(0x600 + rig.node, request):
             if answer[0] & 0xC3 == 0xC1 and not answer[0] & 0x20 and not heard and last is False and request[0] == 0xA2:
                 assert int.from_bytes(answer[1:3], "little") == crc_hqx(data[: len(NAME)], 0)
@@ -185,3 +186,24 @@ def test_an_ordinary_request_ends_a_block(rig: Rig) -> None:
     assert rig.read(0x1000) == 0x20192
     with pytest.raises(Abort):
         rig.sdo(bytes([0xA3]) + bytes(7))
+
+
+@pytest.mark.parametrize("request_", [b"\xc6\x65\x60\x00\x04", b"\xa4\x08\x10\x00\x7f"], ids=["download", "upload"])
+def test_a_client_that_ends_in_the_middle_of_its_block_blocks_no_other(rig: Rig, request_: bytes) -> None:
+    rig.sdo(request_.ljust(8, b"\0"))
+    rig.wait(2.1, step=0.1)
+    download_block(rig, 0x6065, (1234).to_bytes(4, "little"))
+    assert rig.read(0x6065) == 1234
+
+
+def test_a_block_may_take_its_time(rig: Rig) -> None:
+    rig.sdo(struct.pack("<BHBI", 0xC6, 0x6065, 0, 4))
+    rig.wait(1.9, step=0.1)
+    assert rig.sdo(b"\x81\x04\x03\x02\x01\0\0\0")[:2] == b"\xa2\x01"
+
+
+@pytest.mark.parametrize("index, size", [(0x6060, 1), (0x605A, 2), (0x6065, 4)])
+def test_a_client_need_not_say_how_many_bytes_it_writes(rig: Rig, index: int, size: int) -> None:
+    answer = rig.sdo(struct.pack("<BHBI", 0x22, index, 0, 6))
+    assert answer == struct.pack("<BHB4x", 0x60, index, 0)
+    assert rig.read(index) == 6

@@ -58,7 +58,7 @@ def test_against_the_clock(mode: str, alone: Path) -> None:
     assert rds.open_result("run").meta["controller"]["X"]["name"] == "a for loop"
 
 
-@pytest.mark.parametrize("voltage", [None, "a", float("nan"), [1.0, 2.0]])
+@pytest.mark.parametrize("voltage", [None, "a", "3", True, float("nan"), [1.0, 2.0]])
 def test_what_is_no_voltage_is_told_with_its_time(voltage: Any) -> None:
     run = rds.steps(**given())
     first = next(run)
@@ -79,6 +79,23 @@ def test_a_loop_that_is_left_ends_the_run_at_rest() -> None:
     assert not result["X_command"][50:].any()
     with pytest.raises(StopIteration):
         next(run)
+
+
+def test_a_run_is_taken_once() -> None:
+    run = rds.steps(**given())
+    stepped(run)
+    with pytest.raises(InputError, match=r"this run is over: .* call rds.steps again"):
+        for _ in run:
+            pass
+
+
+@pytest.mark.parametrize("name", ["t", "reference", "measured", "volts"])
+def test_a_loop_sets_the_voltage_and_nothing_else(name: str) -> None:
+    with (
+        rds.steps(**given()) as run,
+        pytest.raises(AttributeError, match=f"step.{name} cannot be set: a loop sets step.v"),
+    ):
+        setattr(next(run), name, 1.0)
 
 
 def test_a_loop_that_raises_ends_the_run_too() -> None:

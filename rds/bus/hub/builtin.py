@@ -57,6 +57,8 @@ class BuiltinBus(can.BusABC):
     `restart_ms`: come back from bus off by itself, so much later.
     `fd`: False: this node sends no CAN FD frames, send() raises ValueError; it still receives those of others.
 
+    With `receive_own_messages` a node's own frames come back with `is_rx` False, as on SocketCAN.
+
     `channel` is a name of up to 32 letters, digits, '.', '_' and '-'. Time stamps are given by the hub: seconds since
     the epoch by a clock that never steps, the same for all nodes; with bit timing, of the end of the frame on the
     wire. A bus must not be used in a forked child.
@@ -251,7 +253,8 @@ class BuiltinBus(can.BusABC):
     @state.setter
     def state(self, new_state: can.BusState) -> None:
         raise NotImplementedError(
-            "a controller's error state follows from its counters; restart() leads out of bus off"
+            f"the state cannot be set to {new_state}: a controller's error state follows from its counters, restart() "
+            "leads out of bus off, and no node of the built-in bus only listens; who sends nothing disturbs nothing"
         )
 
     def restart(self) -> None:
@@ -332,10 +335,14 @@ class BuiltinBus(can.BusABC):
                 self._early.append(record)
         return ""
 
-    def _send_periodic_internal(self, *args: Any, **options: Any) -> Any:
-        """As python-can's. Raises can.CanOperationError at once if the bus is gone, not in the thread that sends."""
+    def _send_periodic_internal(self, msgs: Any, period: float, *args: Any, **options: Any) -> Any:
+        """As python-can's. Raises can.CanOperationError at once if the bus is gone, not in the thread that sends;
+        ValueError for a period that is none, by which python-can would send as fast as it can.
+        """
         self._require_hub()
-        return super()._send_periodic_internal(*args, **options)
+        if not period > 0.0:
+            raise ValueError(f"{self.channel_info}: period {period!r} s must be more than 0; send() sends once")
+        return super()._send_periodic_internal(msgs, period, *args, **options)
 
     def shutdown(self) -> None:
         """Leave the bus. May be called more than once. Frames sent before still reach the others."""

@@ -196,6 +196,12 @@ def check_frame(key: bytes) -> tuple[int, bool]:
         raise WireError(f"{length} bytes (dlc {dlc}) are no length of a {'CAN FD' if flags & FD else 'CAN'} frame")
     if not flags & (FD | REMOTE | ERROR) and dlc != length:
         raise WireError(f"it has {length} bytes of data, and its length (dlc) says {dlc}")
-    if flags & OWN or (flags & REMOTE and (length or flags & FD)):
+    if flags & REMOTE and flags & FD:
+        raise WireError("CAN FD has no remote frames; ask by a classic one")
+    if flags & REMOTE and length:
+        raise WireError(
+            f"a remote frame has no data, and this one {length} bytes; its length (dlc) says what it asks for"
+        )
+    if flags & OWN:
         raise WireError(f"flags {flags:#x} contradict each other")
     return identifier, extended

@@ -37,7 +37,8 @@ def record_of(msg: can.Message) -> bytes:
         if flags or length > 8 or msg.arbitration_id > 0x7FF or msg.dlc != length:
             wire.check_frame(header[wire.KEY_AT])
     except (wire.WireError, struct.error) as error:
-        raise ValueError(f"no such frame can be sent: {msg!r}: {error}") from None
+        why = f"identifier {msg.arbitration_id} is less than 0" if msg.arbitration_id < 0 else error
+        raise ValueError(f"no such frame can be sent: {msg!r}: {why}") from None
     return (header + data).ljust(wire.RECORD, b"\0")
 
 

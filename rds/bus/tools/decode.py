@@ -1,4 +1,4 @@
-"""Frames in words: the cyclic messages by rds/bus/modules/rds/frames.py, all others by DBC files."""
+"""Frames in words: by the DBC files given, the cyclic messages by rds/bus/modules/rds/frames.py, others by our DBC."""
 
 from __future__ import annotations
 
@@ -32,24 +32,25 @@ Decoder = Callable[[can.Message], Decoded | None]
 
 
 def decoder(files_: Sequence[Path] = ()) -> Decoder:
-    """What decodes a frame: the cyclic messages first, then the DBC files in their order, then the dialect's own.
+    """What decodes a frame: the DBC files in their order, then the cyclic messages, then the dialect's own DBC file.
+
+    A file that is given says what is on this bus, be it a bus with no machine of ours on it.
 
     The dialect's own file is left out where cantools isn't installed. A frame that nothing knows is None; one that
     does not fit its description says so under its name. Raises InputError for a file that is no DBC, or if a file is
     given and cantools is missing.
     """
-    databases = [load_dbc(path) for path in files_]
+    given = [load_dbc(path) for path in files_]
     own = own_dbc()
-    if own is not None and find_spec("cantools") is not None:
-        databases.append(load_dbc(own))
+    ours = [load_dbc(own)] if own is not None and find_spec("cantools") is not None else []
 
     def decode(message: can.Message) -> Decoded | None:
         if message.is_error_frame or message.is_remote_frame:
             return None
-        found = None if message.is_extended_id else cyclic(message.arbitration_id, bytes(message.data))
-        for database in databases:
-            found = found or _by_database(database, message)
-        return found
+        found = _by_databases(given, message)
+        if found is None and not message.is_extended_id:
+            found = cyclic(message.arbitration_id, bytes(message.data))
+        return found or _by_databases(ours, message)
 
     return decode
 
@@ -119,6 +120,10 @@ def load_dbc(path: Path) -> Any:
         if "more than 11 bits" in reason:
             remedy = "where its frames are extended ones, add 2147483648 (2^31) to the number behind BO_"
         raise InputError(f"it can't be read as a DBC file: {reason}; {remedy}", str(path)) from error
+
+
+def _by_databases(databases: Sequence[Any], message: can.Message) -> Decoded | None:
+    return next((found for database in databases if (found := _by_database(database, message)) is not None), None)
 
 
 def _by_database(database: Any, message: can.Message) -> Decoded | None:

@@ -21,6 +21,7 @@ _OK, _ERROR = b"\r", b"\a"
 _LOOK = 0.05  # s between two looks at whether it shall end
 _BITRATES = {b"S0": 10_000, b"S1": 20_000, b"S2": 50_000, b"S3": 100_000, b"S4": 125_000, b"S5": 250_000}
 _BITRATES |= {b"S6": 500_000, b"S7": 750_000, b"S8": 1_000_000}
+_QUARTZ = 8_000_000  # Hz: time quanta of one, the half of 16 MHz
 _ENDS = b"\r"
 _LONGEST = 64  # bytes of a command
 _ON_THE_WIRE = 0.1  # s that a frame may take until the bus has it
@@ -58,6 +59,7 @@ class SlcanAdapter:
         self.path = os.ttyname(self._slave)
         self.bitrate: int | None = None  # that the computer has asked for, bit/s
         self.is_open = False
+        self.only_listens = False
         self._ended = threading.Event()
         self._write_lock = threading.Lock()
         self._threads = [threading.Thread(target=run, daemon=True) for run in (self._serve, self._forward)]
@@ -114,8 +116,11 @@ class SlcanAdapter:
         if line in _BITRATES:
             self.bitrate = _BITRATES[line]
             return _OK
+        if line[:1] == b"s" and (rate := _rate_of_registers(line[1:])) is not None:
+            self.bitrate = rate
+            return _OK
         if line in (b"O", b"L", b"C"):
-            self.is_open = line != b"C"
+            self.is_open, self.only_listens = line != b"C", line == b"L"
             return _OK
         if line == b"V":
             return b"V1013" + _OK
@@ -123,7 +128,7 @@ class SlcanAdapter:
             return b"NRDS0" + _OK
         if line == b"F":
             return b"F00" + _OK
-        if line[:1] in (b"t", b"T", b"r", b"R") and self.takes_part:
+        if line[:1] in (b"t", b"T", b"r", b"R") and self.takes_part and not self.only_listens:
             message = _decode(line)
             if message is not None:
                 with contextlib.suppress(can.CanError, OSError):
@@ -172,6 +177,16 @@ class SlcanAdapter:
     def _say(self, answer: bytes) -> None:
         with self._write_lock, contextlib.suppress(OSError):
             os.write(self._master, answer)
+
+
+def _rate_of_registers(digits: bytes) -> int | None:
+    """The bit rate of the registers BTR0 and BTR1 of an SJA1000 at 16 MHz, four hexadecimal digits; None for others."""
+    try:
+        btr0, btr1 = bytes.fromhex(digits.decode("ascii"))
+    except ValueError:
+        return None
+    quanta = 3 + (btr1 & 0x0F) + (btr1 >> 4 & 0x07)  # of a bit: its first, and those before and after the sample
+    return round(_QUARTZ / (((btr0 & 0x3F) + 1) * quanta))
 
 
 def _encode(message: can.Message) -> bytes:

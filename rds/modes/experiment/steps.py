@@ -30,9 +30,19 @@ class Step:
 
     __slots__ = ("measured", "reference", "t", "voltage")
 
+    t: float
+    reference: Reference
+    measured: Any
+    voltage: Any
+
     def __init__(self, t: float, reference: Reference, measured: Any):
-        self.t, self.reference, self.measured = t, reference, measured
-        self.voltage: Any = None
+        for name, value in (("t", t), ("reference", reference), ("measured", measured), ("voltage", None)):
+            object.__setattr__(self, name, value)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name != "voltage":
+            raise AttributeError(f"step.{name} cannot be set: a loop sets step.voltage, and reads the rest of a step")
+        object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         return f"Step(t={self.t!r}, reference={self.reference!r}, measured={self.measured!r}, voltage={self.voltage!r})"
@@ -63,6 +73,8 @@ class Steps:
         return self
 
     def __iter__(self) -> Steps:
+        if self._over:
+            raise InputError("this run is over: `result` has what it recorded; for another run call rds.steps again")
         return self
 
     def __next__(self) -> Step:
@@ -130,6 +142,8 @@ class Steps:
     def _voltages(self, step: Step) -> list[float]:
         given = step.voltage
         with suppress(TypeError, ValueError):
+            if isinstance(given, str | bytes | bool):  # which NumPy reads as numbers
+                raise TypeError
             values: list[float] = np.asarray(given, dtype=float).reshape(self._n).tolist()
             if all(map(isfinite, values)):
                 return values

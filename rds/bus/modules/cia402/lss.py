@@ -17,6 +17,8 @@ _SWITCH, _NODE_ID, _BIT_TIMING, _STORE = 0x04, 0x11, 0x13, 0x17
 _SELECT, _SELECTED = (0x40, 0x41, 0x42, 0x43), 0x44
 _INQUIRE = (0x5A, 0x5B, 0x5C, 0x5D)
 _INQUIRE_NODE, _FAST, _FOUND = 0x5E, 0x51, 0x4F
+_IDENTIFY = (0x46, 0x47, 0x48, 0x49, 0x4A, 0x4B)  # vendor, product, revision from, to, serial number from, to
+_IDENTIFY_NEW, _FOUND_NEW = 0x4C, 0x50
 _WAIT = 0.1  # s for an answer; a fast scan asks 132 times at most
 _RESET = 128  # bit check that begins a fast scan anew
 _STORES = 5.0  # s for a drive to write its memory
@@ -99,6 +101,7 @@ class Slave:
         self._pending = node
         self.is_configuring = False
         self._selected = 0  # parts of the address that have fitted
+        self._identified = 0  # the same for a range of addresses
         self._part = 0  # of a fast scan
 
     def receive(self, data: bytes) -> bytes | None:
@@ -113,6 +116,10 @@ class Slave:
             return self._answer(_FOUND) if self.node == UNCONFIGURED and self._fits(value, *data[5:8]) else None
         if command in _SELECT:
             return self._select(_SELECT.index(command), value)
+        if command in _IDENTIFY:
+            return self._identify(_IDENTIFY.index(command), value)
+        if command == _IDENTIFY_NEW:
+            return self._answer(_FOUND_NEW) if self.node == UNCONFIGURED else None
         if not self.is_configuring:
             return None
         if command == _NODE_ID:
@@ -140,6 +147,19 @@ class Slave:
             return None
         self._selected, self.is_configuring = 0, True
         return self._answer(_SELECTED)
+
+    def _identify(self, part: int, value: int) -> bytes | None:
+        vendor, product, revision, serial = self._identity()
+        fits = (
+            value == vendor,
+            value == product,
+            value <= revision,
+            revision <= value,
+            value <= serial,
+            serial <= value,
+        )[part] and part in (0, self._identified)
+        self._identified = part + 1 if fits else 0
+        return self._answer(_FOUND) if self._identified == len(_IDENTIFY) else None
 
     def _fits(self, number: int, bit: int, part: int, following: int) -> bool:
         if bit == _RESET:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from canopen.objectdictionary.datatypes import NUMBER_TYPES
 from canopen.sdo import SdoAbortedError, SdoServer
 from canopen.sdo.constants import (
     EXPEDITED,
@@ -14,6 +15,7 @@ from canopen.sdo.constants import (
     REQUEST_BLOCK_DOWNLOAD,
     REQUEST_BLOCK_UPLOAD,
     SDO_STRUCT,
+    SIZE_SPECIFIED,
 )
 
 from rds.bus.modules.cia402.codes import Abort
@@ -21,6 +23,7 @@ from rds.bus.modules.cia402.dictionary import Dictionary
 from rds.bus.modules.cia402.sdo_block import BlockTransfers
 
 _LONGEST = 1 << 10  # bytes in a segmented download; no object of ours is longer
+_PATIENCE = 2.0  # s between two frames of a block; then the client that began it has gone
 
 
 class _Out:
@@ -44,12 +47,20 @@ class Server(SdoServer):
         self.network = _Out(send)
         self._dictionary = dictionary
         self._index = self._subindex = 0
+        self._heard = 0.0  # s, the last request
         self._blocks = BlockTransfers(dictionary, lambda answer: send(0x580 + node, answer))
 
     def on_request(self, can_id: int, data: bytes, timestamp: float) -> None:
-        """Answer a request. A frame of a wrong length is none."""
+        """Answer a request of the instant `timestamp`, s. A frame of a wrong length is none.
+
+        While segments of a block are expected, every frame is one. So a client that ended in the middle of its block
+        would leave the server deaf: a block without a frame for `_PATIENCE` is forgotten.
+        """
         if len(data) != 8:
             return
+        if timestamp - self._heard > _PATIENCE:
+            self._blocks.end()
+        self._heard = timestamp
         if self._blocks.busy or data[0] & 0xE0 in (REQUEST_BLOCK_UPLOAD, REQUEST_BLOCK_DOWNLOAD):
             self._index, self._subindex = int.from_bytes(data[1:3], "little"), data[3]
             try:
@@ -62,9 +73,14 @@ class Server(SdoServer):
         super().on_request(can_id, bytearray(data), timestamp)
 
     def init_download(self, request: bytearray) -> None:
-        """As canopen's, but what can't be written is refused before its segments come."""
+        """As canopen's, but what can't be written is refused before its segments come.
+
+        A client may leave out how many of the four bytes it sends; then the object's type says so.
+        """
         command, self._index, self._subindex = SDO_STRUCT.unpack_from(request)
-        self._dictionary.check_writable(self._index, self._subindex)
+        variable = self._dictionary.check_writable(self._index, self._subindex)
+        if command & EXPEDITED and not command & SIZE_SPECIFIED and variable.data_type in NUMBER_TYPES:
+            request[0] |= SIZE_SPECIFIED | max(0, 4 - len(variable) // 8) << 2
         super().init_download(request)
         if command & EXPEDITED:
             self._buffer = None
