@@ -342,12 +342,13 @@ def _above(key: Key, messages: Iterable[Message]) -> int:
 
 
 def _cycles(messages: Iterable[Message], log: _Log, paired: Mapping[str, Paired]) -> tuple[dict[str, np.ndarray], int]:
-    """Delays of each cycle, s: until its first frame is there, and from then until its last answer is; NaN: not all.
+    """Delays of each cycle, s: until its first frame is there, and from then until its last one is; NaN: not all.
 
     Besides, how many cycles were not over before the next one.
     """
     by_name = {message.name: message for message in messages}
-    answers = [m for m in by_name.values() if m.after is not None and m.period == _root(m, by_name).period]
+    cyclic = [m for m in by_name.values() if m.after is not None and m.period == _root(m, by_name).period]
+    answers = [message for message in cyclic if len(paired[message.name].delays)]  # a run need not move all axes
     roots = {_root(message, by_name).name for message in answers}
     if len(roots) != 1:
         return {}, 0

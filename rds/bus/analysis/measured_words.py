@@ -8,6 +8,7 @@ import numpy as np
 
 from rds.bus.analysis.analysis_report import aligned, time_text
 from rds.bus.analysis.cycles import OTHER_PERIOD
+from rds.bus.analysis.messages import HOST
 
 if TYPE_CHECKING:
     from rds.bus.analysis.measured import Delays, Measured
@@ -90,22 +91,27 @@ def tracking(measured: Measured) -> list[str]:
     whole = sensor[np.isfinite(sensor)]
     lost = len(sensor) - len(whole)
     if not len(whole):
-        return [f"Tracking: none of {lost} cycles has all its answers."]
+        return [f"Tracking: none of {lost} cycles has all its frames."]
     period = min(row.period for row in measured.rows if row.by_cycle)
     middle, most = float(np.median(whole)), float(whole.max())
     said = (
-        f"Tracking: the last answer of a cycle comes {time_text(middle)} (median) and at most {time_text(most)} after "
+        f"Tracking: the last frame of a cycle comes {time_text(middle)} (median) and at most {time_text(most)} after "
         f"its first frame, {100 * middle / period:.1f} % and {100 * most / period:.1f} % of the sample period. A "
         f"position of that age is up to {most * 1e3:.3g} µm behind for each mm/s of the axis."
     )
     if measured.overrun or lost:
         said += (
-            f" Of {len(sensor)} cycles {measured.overrun} end after the next one has begun, and {lost} have answers "
+            f" Of {len(sensor)} cycles {measured.overrun} end after the next one has begun, and {lost} have frames "
             "missing: such a cycle costs the loop a sample of delay."
         )
-    how = (
+    answers = {message.name for message in measured.analysis.messages if message.after is not None}
+    at_once = any(row.sender == HOST for row in measured.analysis.rows if row.name in answers)
+    next_command = (
         "RDS's host sends the voltages with the next command, so a cycle that is complete in time costs its loop no "
-        "more than that one sample. For a host that sends them at once: --trace FILE.csv writes the delays of each "
+        "more than that one sample. For a host that sends them at once: "
+    )
+    how = ("" if at_once else next_command) + (
+        "--trace FILE.csv writes the delays of each "
         "cycle, and `rds network cost EXPERIMENT.toml --delays FILE.csv` tells what their mean and jitter cost; `rds "
         "design lqg` tells the margins."
     )
