@@ -146,6 +146,16 @@ def test_no_delay_is_measured_beyond_the_bound_on_the_timed_bus(seed: int) -> No
         assert row.log_period == pytest.approx(message.period * (1 - 80e-6), rel=3e-4)
 
 
+@pytest.mark.parametrize("count", [1, 2, 7, 12, 400])
+@pytest.mark.parametrize("late, answers", [(300_000, 0), (900_000, 200_000), (0, 2_000_000)])
+def test_hosts_that_are_late_by_nearly_a_period_and_short_logs_are_not_beyond_either(
+    count: int, late: int, answers: int
+) -> None:
+    analysis = cnc(host_jitter=late * 1e-9, response_time=answers * 1e-9)
+    found = of_frames(analysis, cycles(analysis, count, late, answers))
+    assert found.met, str(found)
+
+
 def test_frames_that_are_missing_late_for_a_whole_period_and_sent_beside_it_are_told_apart() -> None:
     table = analyse_messages([Message("m", 0x100, False, 8, 1e-3)])
     times = [k * 1e-3 for k in range(200) if k not in (50, 60)]

@@ -29,7 +29,7 @@ OTHER_PERIOD = 5e-3  # of the period: no clock of a computer is that wrong
 _CLOCKS = 2e-4  # of the period: two clocks may differ by that
 _USUAL = (0.5, 1.5)  # medians: gaps without a frame missing
 _BEGIN = 50  # frames whose phases tell the first instant
-_EARLY = 0.25  # periods that a frame may come before its instant, while instants are not known exactly
+_EARLY = (0.25, 0.05)  # periods that a frame may come before its instant, while instants are not known exactly
 _CLEARLY = 0.05  # periods
 _UP, _DOWN = 0.01, 0.3  # how much of a later, and of an earlier frame moves the instants
 _ROUNDS = 40  # of the search for a grid: it ends within 1e-10 of a period
@@ -93,8 +93,8 @@ def _own_period(gaps: np.ndarray, period: float) -> float:
     usual = gaps[(gaps >= _USUAL[0] * middle) & (gaps <= _USUAL[1] * middle)]
     if middle <= 0.0 or 2 * len(usual) <= len(gaps):
         return period
-    own = float(usual.mean())
-    return period if abs(own / period - 1.0) <= OTHER_PERIOD else own
+    own, doubt = float(usual.mean()), float(np.ptp(usual)) / len(usual)
+    return period if abs(own - period) <= OTHER_PERIOD * period + doubt else own
 
 
 def _caught_up(gaps: np.ndarray, period: float) -> np.ndarray:
@@ -103,8 +103,17 @@ def _caught_up(gaps: np.ndarray, period: float) -> np.ndarray:
 
 
 def _run(starts: np.ndarray, ends: np.ndarray, period: float, own: float) -> Paired:
-    """The delays of frames without a pause."""
-    cycles, extra = _distinct(_counted(starts, own))
+    """The delays of frames without a pause, counted so that the largest is the least."""
+    counted = [_counted(starts, own, early) for early in _EARLY]
+    counted.append(np.arange(len(starts)))  # none is missing: then frames may be late by nearly a period
+    found = [_delays(starts, ends, *_distinct(cycles), period, own) for cycles in counted]
+    return min(found, key=lambda each: (len(each.least) < len(found[0].least), float(each.least.max())))
+
+
+def _delays(
+    starts: np.ndarray, ends: np.ndarray, cycles: np.ndarray, extra: np.ndarray, period: float, own: float
+) -> Paired:
+    """The delays of frames whose instants are counted."""
     extra |= _out_of_turn(starts, cycles, own)
     places = np.flatnonzero(~extra)
     starts, ends, cycles = starts[places], ends[places], cycles[~extra]
@@ -157,15 +166,15 @@ def _possible(starts: np.ndarray, cycles: np.ndarray, period: float, own: float)
     return low * (1.0 - _CLOCKS), high * (1.0 + _CLOCKS)
 
 
-def _counted(starts: np.ndarray, period: float) -> np.ndarray:
+def _counted(starts: np.ndarray, period: float, early: float) -> np.ndarray:
     """The number of the instant before each frame; the instants follow the earliest frames.
 
-    A frame is late more often than early: most of the period is taken for lateness.
+    A frame is late more often than early: but for `early` periods, all of the period is taken for lateness.
     """
     cycles = np.zeros(len(starts), int)
     phase, count = _first_instant(starts[:_BEGIN], period), 0
     for place, start in enumerate(starts.tolist()):
-        steps = floor((start - phase) / period + _EARLY)
+        steps = floor((start - phase) / period + early)
         count += max(0, steps)
         phase += max(0, steps) * period
         late = start - phase

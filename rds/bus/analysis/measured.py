@@ -222,8 +222,9 @@ class _Log:
         """Take the next frame."""
         self.statistics.add(frame)
         if self.first is None:
-            self.first, self._channel = frame.timestamp, frame.channel
-        if frame.channel != self._channel:
+            self.first = frame.timestamp
+        self._channel = frame.channel if self._channel is None else self._channel
+        if frame.channel not in (None, self._channel):
             what = f"it has frames of the channels {self._channel} and {frame.channel}, and is to be of one bus"
             raise InputError(f"{what}; keep those of one channel", self.path)
         at = frame.timestamp - self.first
