@@ -172,6 +172,15 @@ def test_frames_that_are_missing_late_for_a_whole_period_and_sent_beside_it_are_
     assert "m did not come in 2 of its periods" in str(found)
 
 
+def test_a_sender_that_begins_again_with_another_phase_is_not_late() -> None:
+    table = analyse_messages([Message("m", 0x100, False, 8, 1e-3)])
+    times = [k * 1e-3 for k in range(60)] + [60.6e-3 + k * 1e-3 for k in range(60)]
+    row = of_frames(table, [frame(0x100, at) for at in times]).row("m")
+    assert (row.verdict, row.pauses, row.frames) == ("within", 1, 120)
+    few = times[:60] + [60.6e-3, 61.6e-3, 62.6e-3] + [k * 1e-3 for k in range(63, 120)]
+    assert of_frames(table, [frame(0x100, at) for at in few]).row("m").verdict == "beyond"  # three in between were late
+
+
 # --- beyond
 
 

@@ -31,6 +31,7 @@ _USUAL = (0.5, 1.5)  # medians: gaps without a frame missing
 _BEGIN = 50  # frames whose phases tell the first instant
 _EARLY = (0.25, 0.05)  # periods that a frame may come before its instant, while instants are not known exactly
 _CLEARLY = 0.05  # periods
+_OTHER_PHASE = 0.1  # periods
 _UP, _DOWN = 0.01, 0.3  # how much of a later, and of an earlier frame moves the instants
 _ROUNDS = 40  # of the search for a grid: it ends within 1e-10 of a period
 
@@ -45,7 +46,7 @@ class Paired:
     least: np.ndarray  # the same by the grid whose largest delay is the least
     missing: int = 0  # instants without a frame
     extra: int = 0  # frames without an instant
-    pauses: int = 0
+    pauses: int = 0  # after which the phase began anew, or where it did so without one
     period: float | None = None  # s, by the log's clock; None where the log does not tell
 
 
@@ -71,6 +72,7 @@ def from_grid(starts: np.ndarray, ends: np.ndarray, period: float) -> Paired:
     gaps = np.diff(starts)
     own = _own_period(gaps, period)
     breaks = np.flatnonzero((gaps > PAUSE * own) | ((gaps > _STALL * own) & ~_caught_up(gaps, own))) + 1
+    breaks = np.union1d(breaks, _new_phases(starts, own))
     runs = [part for part in np.split(np.arange(len(starts)), breaks) if len(part)]
     found = [_run(starts[part], ends[part], period, own) for part in runs]
     longest = max(found, key=lambda run: len(run.places))
@@ -100,6 +102,26 @@ def _own_period(gaps: np.ndarray, period: float) -> float:
 def _caught_up(gaps: np.ndarray, period: float) -> np.ndarray:
     """Whether frames come close behind the one after each gap: they waited, and the period went on."""
     return np.append(gaps[1:] < _USUAL[0] * period, False)
+
+
+def _new_phases(starts: np.ndarray, period: float) -> np.ndarray:
+    """The frames from which on all keep to another phase than those before: the sender has begun again."""
+    late = starts - period * _distinct(_counted(starts, period, _EARLY[0]))[0]
+    found: list[tuple[int, float]] = []
+    for place in (np.flatnonzero(np.abs(np.diff(late)) > _OTHER_PHASE * period) + 1).tolist():
+        before, after = late[max(0, place - PAUSE) : place], late[place : place + PAUSE]
+        if min(len(before), len(after)) < _ENOUGH:
+            continue
+        step = abs(float(after.min() - before.min()))
+        usual = max(float(np.median(part) - part.min()) for part in (before, after))
+        if step <= _OTHER_PHASE * period + 2.0 * usual:
+            continue
+        if found and place - found[-1][0] < PAUSE:  # of neighbours the clearest
+            if step <= found[-1][1]:
+                continue
+            found.pop()
+        found.append((place, step))
+    return np.array([place for place, _ in found], int)
 
 
 def _run(starts: np.ndarray, ends: np.ndarray, period: float, own: float) -> Paired:

@@ -162,10 +162,11 @@ def _evidence(measured: Measured) -> list[str]:
         if row.log_period is not None and abs(row.log_period / row.period - 1.0) > OTHER_PERIOD:
             period = f"{row.log_period * 1e3:.4g} ms in the log, {row.period * 1e3:.4g} ms in the schedule"
             said.append(f"Period: {row.name} comes every {period}; its delays count by the log's.")
-        if row.missing or row.pauses:
-            pauses = f"{row.pauses} pause{'s' if row.pauses > 1 else ''}"
-            paused = f", and made {pauses} after which its phase may be another" if row.pauses else ""
-            said.append(f"Missing: {row.name} did not come in {row.missing} of its periods{paused}.")
+        if row.missing:
+            said.append(f"Missing: {row.name} did not come in {row.missing} of its periods.")
+        if row.pauses:
+            again = f"{row.pauses} time{'s' if row.pauses > 1 else ''}"
+            said.append(f"Pauses: {row.name} began anew {again}, after a pause or with another phase.")
         if row.longer:
             said.append(f"Length: {row.longer} frames of {row.name} have more bytes than in the schedule.")
     if measured.errors:
