@@ -19,6 +19,7 @@ __getattr__, __dir__ = face(
         "Watch": "modules.oacs.watch",
         "add_to_queue": "modules.dcs.buffers",
         "analyse_messages": "analysis.analysis_report",
+        "measured": "analysis.measured",
         "messages_of": "analysis.messages",
         "prepare_data": "modules.dcs.buffers",
         "read_messages": "analysis.message_tables",

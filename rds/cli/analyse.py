@@ -10,6 +10,8 @@ import typer
 from rds.cli.common import Json, print_json, refusals, writes_files
 
 if TYPE_CHECKING:
+    from rds.bus.analysis.analysis_report import Analysis
+    from rds.bus.analysis.measured import Measured
     from rds.bus.analysis.response_times import Errors
 
 
@@ -49,6 +51,13 @@ def analyse(
     fits: Annotated[
         bool, typer.Option("--fits", help="On CAN: what fits, as with --period; with --plot curves.")
     ] = False,
+    measured: Annotated[
+        Path | None, typer.Option(help="A log of this bus: its delays beside the worst cases.", metavar="LOG")
+    ] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(help="With --measured: each cycle's delays, a trace for \\[network], FILE.csv."),
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Write the timeline and response times, or curves, as a PNG.")
     ] = None,
@@ -56,15 +65,16 @@ def analyse(
 ) -> None:
     """Bus load, and every message's worst-case response time (Davis, Burns, Bril and Lukkien, 2007).
 
-    With --period: what fits, by method, units and bit rate, with margin. On a serial line (--dialect dcs) the same, by
-    baud rate.
+    With --measured LOG: the delays that were recorded, beside these bounds. With --period: what fits, by method, units
+    and bit rate, with margin. On a serial line (--dialect dcs) the same, by baud rate.
     """
     with refusals():
         from rds.core.errors import InputError
 
         serial = {"--baud": baud}
-        can = {"--bitrate": bitrate, "--response-time": response_time, "--host-jitter": host_jitter, "--errors": errors}
-        can |= {"--error-interval": error_interval, "--fits": fits}
+        can: dict[str, object] = {"--bitrate": bitrate, "--response-time": response_time, "--host-jitter": host_jitter}
+        can |= {"--errors": errors, "--error-interval": error_interval, "--fits": fits}
+        can |= {"--measured": measured, "--trace": trace}
         wrong = [name for name, value in (can if dialect == "dcs" else serial).items() if value]
         if wrong:
             where = "a CAN bus" if dialect == "dcs" else "a serial line (--dialect dcs)"
@@ -75,6 +85,10 @@ def analyse(
 
             met = show_serial(load_machine(machine), baud, units, sample_period, plot, json)
             raise typer.Exit(0 if met else 1)
+        if trace is not None and measured is None:
+            raise InputError("--trace is of measured delays; give a log by --measured")
+        if fits and measured is not None:
+            raise InputError("--fits is of what could be, and --measured of what was; leave one of them out")
         asked = fits or sample_period is not None
         if units is not None and not (asked and dialect == "rds"):
             raise InputError("--units is of what fits a serial line or modules of dialect rds: add --fits or --period")
@@ -91,7 +105,8 @@ def analyse(
             words = {"--dialect": dialect != "rds", "--response-time": response_time, "--host-jitter": host_jitter}
             if wrong := [name for name, value in (words | {"--fits": fits}).items() if value]:
                 raise InputError(f"{', '.join(wrong)} is for a machine, not for a message table; leave it out")
-            _analyse_table(table, 1_000_000 if bitrate is None else bitrate, sample_period, disturbed, plot, json)
+            rate = 1_000_000 if bitrate is None else bitrate
+            _analyse_table(table, rate, sample_period, disturbed, measured, trace, plot, json)
         analysis = analyse_bus(
             load_machine(machine),
             1_000_000 if bitrate is None else bitrate,
@@ -101,10 +116,11 @@ def analyse(
             host_jitter=host_jitter,
             errors=disturbed,
         )
+        found = _lay_over(analysis, measured, trace)
         if plot is not None:
             from rds.cli.analyse_fits import draw_can
 
-            draw_can(plot, analysis, load_machine(machine), sample_period, dialect, fits)
+            draw_can(plot, analysis, load_machine(machine), sample_period, dialect, fits, found)
         rows, methods = [], []
         if asked:
             from rds.cli.analyse_fits import can_methods, can_rows
@@ -120,20 +136,54 @@ def analyse(
             if dialect == "rds":
                 methods = can_methods(load_machine(machine), sample_period, bitrate, units)
     if json:
-        print_json(analysis.to_json() | ({"fits": rows, "methods": methods} if asked else {}))
+        fitting = {"fits": rows, "methods": methods} if asked else {}
+        print_json(analysis.to_json() | fitting | ({"measured": found.to_json()} if found else {}))
     else:
-        typer.echo(str(analysis))
+        _show(analysis, found, trace)
         if asked:
             from rds.cli.analyse_fits import show_can
 
             show_can(rows, methods)
         if plot is not None:
             typer.echo(f"plot: {plot}")
-    raise typer.Exit(0 if analysis.met else 1)
+    raise typer.Exit(0 if analysis.met and (found is None or found.met) else 1)
+
+
+def _lay_over(analysis: Analysis, log: Path | None, trace: Path | None) -> Measured | None:
+    """The log against the analysis; its cycles written as a trace."""
+    if log is None:
+        return None
+    from rds.bus.analysis.measured import measured
+
+    found = measured(analysis, log)
+    if trace is not None:
+        from rds.core.errors import InputError
+        from rds.network.trace import write_trace
+
+        if not found.cycle:
+            raise InputError("--trace is of cycles of a command and its answers, which this schedule has not")
+        about = f"delays of {analysis.title} in {log.name}: first frame (at least), and from it to the last answer, s"
+        write_trace(trace, found.cycle, (about,))
+    return found
+
+
+def _show(analysis: Analysis, found: Measured | None, trace: Path | None) -> None:
+    typer.echo(str(analysis))
+    if found is not None:
+        typer.echo(f"\n{found}")
+    if trace is not None:
+        typer.echo(f"trace: {trace}")
 
 
 def _analyse_table(
-    path: Path, bitrate: int, period: float | None, errors: Errors | None, plot: Path | None, json: bool
+    path: Path,
+    bitrate: int,
+    period: float | None,
+    errors: Errors | None,
+    log: Path | None,
+    trace: Path | None,
+    plot: Path | None,
+    json: bool,
 ) -> None:
     """The bus of somebody else's message table."""
     from rds.bus.analysis.analysis_report import analyse_messages
@@ -141,14 +191,16 @@ def _analyse_table(
 
     table = read_messages(path, period)
     analysis = analyse_messages(table.messages, bitrate, errors=errors, title=path.name)
+    found = _lay_over(analysis, log, trace)
     if plot is not None:
         from rds.cli.analyse_fits import draw
 
-        draw(plot, analysis)
+        draw(plot, analysis, found)
     if json:
-        print_json(analysis.to_json() | {"without_period": table.without_period})
+        told = {"without_period": table.without_period} | ({"measured": found.to_json()} if found else {})
+        print_json(analysis.to_json() | told)
     else:
-        typer.echo(str(analysis))
+        _show(analysis, found, trace)
         if plot is not None:
             typer.echo(f"plot: {plot}")
     if table.without_period:
@@ -158,4 +210,4 @@ def _analyse_table(
             f"period in the file and are left out: {names}; --sample-period gives them one",
             err=True,
         )
-    raise typer.Exit(0 if analysis.met else 1)
+    raise typer.Exit(0 if analysis.met and (found is None or found.met) else 1)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rds.bus.analysis.analysis_report import Analysis
+    from rds.bus.analysis.measured import Measured
     from rds.machines import Machine
 
 _BITRATES = (125_000, 250_000, 500_000, 1_000_000)
@@ -98,17 +99,25 @@ def show_can(rows: list[list[Any]], methods: list[list[Any]]) -> None:
         show_table("A part program by methods", COLUMNS, [[cell(value) for value in row] for row in methods])
 
 
-def draw(plot: Path, analysis: Analysis) -> None:
-    """The timeline and response times of an analysis."""
+def draw(plot: Path, analysis: Analysis, measured: Measured | None = None) -> None:
+    """The timeline and response times of an analysis, and over them what was measured."""
     from rds.bus.analysis.analysis_plot import plot as draw_analysis
 
-    _save(plot, draw_analysis(analysis))
+    _save(plot, draw_analysis(analysis, measured))
 
 
-def draw_can(plot: Path, analysis: Analysis, machine: Machine, period: float | None, dialect: str, fits: bool) -> None:
+def draw_can(
+    plot: Path,
+    analysis: Analysis,
+    machine: Machine,
+    period: float | None,
+    dialect: str,
+    fits: bool,
+    measured: Measured | None = None,
+) -> None:
     """The timeline of an analysis; with `fits` the curves of methods A, B and C, which are of dialect rds."""
     if not fits:
-        draw(plot, analysis)
+        draw(plot, analysis, measured)
         return
     if dialect != "rds":
         raise InputError(f"--fits --plot draws the curves of dialect rds, not of {dialect}; leave --fits or --plot out")

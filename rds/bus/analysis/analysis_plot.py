@@ -6,21 +6,27 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from rds.bus.analysis.analysis_report import MET, MISSED, Analysis, Row, time_text
+from rds.bus.analysis.measured_words import BEYOND
 from rds.bus.medium.bits import INTERFRAME
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from rds.bus.analysis.measured import Delays, Measured
+
 # Okabe and Ito, "Color Universal Design" (2008)
 _BLUE, _ORANGE, _VERMILLION, _GREY, _BLACK = "#0072B2", "#E69F00", "#D55E00", "#8A8A8A", "#000000"
 _COLOURS = {MET: _BLUE, MISSED: _ORANGE}
 _PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
+_BINS = 200  # of the measured distribution, over the width
 _SEVERAL = 20  # messages beyond which the picture gets no taller
 
 
-def plot(analysis: Analysis) -> Figure:
+def plot(analysis: Analysis, measured: Measured | None = None) -> Figure:
     """Above, one cycle with the table's data, a line each; below, worst responses with deadlines; times in µs.
+
+    With `measured`, over the worst responses how often each delay was measured, and where the largest is.
 
     A matplotlib Figure of its own, without pyplot and display. In the cycle every message that needs no other one is
     released at 0; the light bar before a frame is the time that it waits, the mark its release.
@@ -31,7 +37,7 @@ def plot(analysis: Analysis) -> Figure:
     figure = Figure(figsize=(10.0, 2.9 + 0.56 * lines), dpi=128, layout="constrained", facecolor="white")
     above, below = figure.subplots(2, 1)
     _cycle(above, analysis)
-    _responses(below, analysis)
+    _responses(below, analysis, measured)
     for axes in (above, below):
         axes.set_yticks(range(len(analysis.rows)), [_label(row) for row in analysis.rows])
         axes.set_ylim(len(analysis.rows) - 0.4, -0.6)  # the highest priority on top
@@ -68,19 +74,57 @@ def _cycle(axes: Axes, analysis: Analysis) -> None:
     axes.set_title(title, fontsize="medium", loc="left")
 
 
-def _responses(axes: Axes, analysis: Analysis) -> None:
+def _responses(axes: Axes, analysis: Analysis, measured: Measured | None) -> None:
     finite = [time for row in analysis.rows for time in (row.response, row.deadline) if isfinite(time)]
+    finite += [row.largest for row in measured.rows if row.largest is not None] if measured else []
     edge = 1.12e6 * max(finite)
     for place, row in enumerate(analysis.rows):
         if isfinite(row.response):
-            axes.barh(place, row.response * 1e6, height=0.5, color=_COLOURS[row.verdict])
+            alpha = 1.0 if measured is None else 0.25
+            axes.barh(place, row.response * 1e6, height=0.5, color=_COLOURS[row.verdict], alpha=alpha)
         else:
             axes.barh(place, edge, height=0.5, color=_VERMILLION, alpha=0.35, hatch="//", edgecolor="white")
         deadline = row.deadline * 1e6
         axes.plot([deadline, deadline], [place - 0.4, place + 0.4], color=_BLACK, linewidth=1.6)
-        _say(axes, place, row, edge)
+        if measured is None:
+            _say(axes, place, row, edge)
+        else:
+            _measured(axes, place, measured.rows[place], edge)
     axes.set_xlim(0, edge)
-    axes.set_xlabel("worst-case response since the beginning of the cycle [µs]; the mark is the deadline")
+    what = "the mark is the deadline"
+    if measured is not None:
+        what += "\ndark: how often so long was measured; the triangle is the largest"
+    axes.set_xlabel(f"worst-case response since the beginning of the cycle [µs]; {what}")
+
+
+def _measured(axes: Axes, place: int, row: Delays, edge: float) -> None:
+    """The distribution of the delays on the message's line, as high as its bar where most are."""
+    import numpy as np
+
+    if row.largest is None:
+        return
+    counts, edges = np.histogram(row.values * 1e6, bins=np.linspace(0.0, edge, _BINS + 1))
+    heights = np.sqrt(counts / max(1, counts.max()))  # rare ones are to be seen
+    colour = _VERMILLION if row.verdict == BEYOND else _BLACK
+    axes.stairs(place + 0.25 - 0.5 * heights, edges, baseline=place + 0.25, fill=True, color=_BLUE, zorder=3)
+    largest = row.largest * 1e6
+    axes.plot([largest], [place + 0.34], marker="^", color=colour, markersize=6, zorder=4)
+    words = f"{time_text(row.largest)}, {row.verdict}"
+    if row.verdict == BEYOND:
+        words += f" by {time_text(row.beyond)}"
+    inside = largest > 0.7 * edge
+    axes.annotate(
+        words,
+        (largest, place + 0.34),
+        (-8 if inside else 8, 0),
+        textcoords="offset points",
+        ha="right" if inside else "left",
+        va="center",
+        fontsize="small",
+        color=colour,
+        bbox=_PAPER,
+        zorder=4,
+    )
 
 
 def _say(axes: Axes, place: int, row: Row, edge: float) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any, NamedTuple
 
@@ -63,6 +63,7 @@ class Analysis:
     cycle: tuple[Slot, ...]  # one release of each message at once, exact lengths; ns
     worst_cycle: float  # s until the last response at worst; inf if one is unbounded
     assumed: str = ""  # what the worst cases rest on, in words
+    machine: bool = False  # of a machine, whose host and modules have options; else of a message table
 
     @property
     def met(self) -> bool:
@@ -144,7 +145,8 @@ def analyse(
         _words(errors),
     ]
     title = f"{machine.name}, {1 / period:g} Hz" + ("" if dialect == DEFAULT else f", dialect {dialect}")
-    return analyse_messages(table, bitrate, errors=errors, title=title, assumed=", ".join(assumed))
+    found = analyse_messages(table, bitrate, errors=errors, title=title, assumed=", ".join(assumed))
+    return replace(found, machine=True)
 
 
 def analyse_messages(
@@ -254,10 +256,15 @@ def _table(rows: Iterable[Row]) -> list[str]:
         )
         for row in rows
     ]
-    widths = [max(len(line[column]) for line in cells) for column in range(len(head))]
+    return aligned(cells, left=(0, 9))
+
+
+def aligned(cells: Sequence[Sequence[str]], left: Container[int]) -> list[str]:
+    """Lines of equal columns, to the right but for those in `left`."""
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     return [
         "  ".join(
-            cell.ljust(width) if column in (0, 9) else cell.rjust(width)
+            cell.ljust(width) if column in left else cell.rjust(width)
             for column, (cell, width) in enumerate(zip(line, widths, strict=True))
         ).rstrip()
         for line in cells
