@@ -99,6 +99,35 @@ def lqg(
     typer.echo(designed.table() if out is None else f"wrote {out}")
 
 
+@app.command()
+@writes_files
+def relay(
+    run: Annotated[Path, typer.Argument(help="A saved run of the law relay: its folder or result file.")],
+    axis: Annotated[str | None, typer.Option(help="Which axis; by default the first that the law drove.")] = None,
+    delay: Annotated[
+        int | None,
+        typer.Option(min=0, max=200, help="Of the loop, samples, for the margins; by default 1 on a bus, else 0."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write the controller's table, FILE.toml.")] = None,
+    json: Json = False,
+) -> None:
+    """The gains that a relay experiment found, as a [controller] table, and their margins by the run's model."""
+    with refusals():
+        from rds.core.atomic import keep_another, write_whole
+        from rds.identification.robustness.relay import RELAY, relay_gains
+
+        if out is not None:
+            keep_another(out, RELAY, "controller of `rds design relay`")
+        found = relay_gains(run, axis, delay)
+        if out is not None:
+            write_whole(out, found.table().encode())
+    if json:
+        print_json(found.to_json())
+        return
+    typer.echo(str(found))
+    typer.echo(found.table() if out is None else f"wrote {out}")
+
+
 def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:
     from rds.core.errors import InputError
     from rds.identification.fit.design import linear_axis_of, linear_axis_of_machine

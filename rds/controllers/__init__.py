@@ -35,6 +35,7 @@ LIBRARY = Registry(
         "cascade": "rds.controllers.cascade",
         "lqg": "rds.controllers.lqg",
         "smith": "rds.controllers.smith",
+        "relay": "rds.controllers.relay",
     },
 )
 
