@@ -57,6 +57,7 @@ PATIENCE, FEW = 1.0, 50  # s, samples: so long the error may neither change its 
 FILTER = 8.0  # the derivative is filtered with Td/8
 UNEVEN = 0.25  # half cycles that spread by more, rms of their mean, make a doubtful estimate
 COARSE = 3.0  # so does an amplitude of fewer counts of the encoder
+SLOW = 8.0  # samples of a period from which the smallest change of the measurement is a count
 TUNING, HOLDING, NO_OSCILLATION, OFF = 0.0, 1.0, 2.0, 3.0  # what the signal `tuning` says
 
 
@@ -256,7 +257,7 @@ class Tuned:
     ultimate_period: float  # s
     amplitude: float  # mm
     spread: float  # of the half cycles' lengths, rms of their mean
-    count: float  # mm, of the encoder; 0 if it never moved by one
+    count: float  # mm, of the encoder; 0 if the swing is too fast to tell
     options: dict[str, float]  # of the law `pid`, six digits
 
     def controller(self) -> dict[str, Any]:
@@ -294,7 +295,8 @@ def tuned(axis: str, unit: str, signals: Mapping[str, Any], params: Mapping[str,
     if end["tuning"] == HOLDING:
         rule, Ku, Tu = str(params["tune_type"]), end["ultimate_gain"], end["ultimate_period"]
         options = {name: float(f"{value:.6g}") for name, value in gains(Ku, Tu, rule).items()}
-        return Tuned(axis, unit, rule, Ku, Tu, end["amplitude"], end["spread"], end["count"], options)
+        count = end["count"] if Tu >= SLOW * params["T"] else 0.0
+        return Tuned(axis, unit, rule, Ku, Tu, end["amplitude"], end["spread"], count, options)
     if end["tuning"] == NO_OSCILLATION:
         raise InputError(
             f"{axis}: no sustained oscillation came of {end['effort']:g} V with a hysteresis of {end['hysteresis']:g} "
