@@ -1,4 +1,4 @@
-"""`rds design` and `rds machine from`: what a fitted model is for, and laws for a loop with delay."""
+"""`rds design` and `rds machine from`: what a fitted model is for, laws for a loop with delay, and gains by a relay."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from rds.cli.common import Json, print_json, refusals, writes_files
 if TYPE_CHECKING:
     from rds.identification.fit.design import Linear
 
-app = typer.Typer(no_args_is_help=True, help="Controllers designed from a fitted model, or for a loop with delay.")
+app = typer.Typer(
+    no_args_is_help=True, help="Controllers designed from a fitted model, for a loop with delay, or by a relay."
+)
 
 Model = Annotated[Path, typer.Argument(help="A model file, as `rds fit -o` writes it.")]
 
@@ -111,7 +113,7 @@ def relay(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Write the controller's table, FILE.toml.")] = None,
     json: Json = False,
 ) -> None:
-    """The gains that a relay experiment found, as a [controller] table, and their margins by the run's model."""
+    """The gains that a run of the law relay found, as a table of a controller, and their margins by the run's model."""
     with refusals():
         from rds.core.atomic import keep_another, write_whole
         from rds.identification.robustness.relay import RELAY, relay_gains

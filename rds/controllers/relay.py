@@ -99,8 +99,8 @@ def control(t: float, r: Reference, y: float, state: State, params: Mapping[str,
         s = State(TUNING if start else OFF, bias=params["bias"], centre=float(r[0]), last=float(y))
     elif start < s.started and s.tuning == TUNING:
         s = s._replace(tuning=OFF)
-    elif s.tuning == TUNING and relay != (s.effort, s.hysteresis):
-        s = _anew(s)
+    elif s.tuning in (TUNING, NO_OSCILLATION) and relay != (s.effort, s.hysteresis):
+        s = _anew(s)._replace(tuning=TUNING)
     if s.tuning == TUNING:
         s = s._replace(effort=relay[0], hysteresis=relay[1])
     s = s._replace(begun=1.0, started=start)
@@ -125,7 +125,7 @@ def _swung(position: float, y: float, s: State, params: Mapping[str, Any]) -> St
     if is_over:
         s = _half_cycle(s, params)
         s = s._replace(side=-s.side, before=s.half, half=0.0, peak=0.0, nearest=size, waited=0.0, passed=s.passed + 1.0)
-        if s.passed - SETTLING - 1.0 >= params["tune_cycles"]:
+        if s.passed - SETTLING >= params["tune_cycles"]:
             return _found(s, params)
     elif size < s.nearest:
         s = s._replace(nearest=size, waited=0.0)
@@ -142,7 +142,7 @@ def _anew(s: State) -> State:
 
 def _half_cycle(s: State, params: Mapping[str, Any]) -> State:
     """A half cycle has ended: it counts, or while the swing settles, a whole one moves the bias."""
-    if s.passed > SETTLING:
+    if s.passed >= SETTLING:
         lengths, squares = s.lengths + s.half, s.squares + s.half * s.half
         return s._replace(lengths=lengths, squares=squares, peaks=s.peaks + s.peak)
     if s.passed < 2.0 or s.passed % 2.0:
@@ -155,7 +155,7 @@ def _half_cycle(s: State, params: Mapping[str, Any]) -> State:
 
 def _found(s: State, params: Mapping[str, Any]) -> State:
     """The gains are known: the state in which the axis is held, its integral at the voltage that it needs."""
-    n = float(params["tune_cycles"])
+    n = s.passed - SETTLING  # tune_cycles, or more if it was lowered meanwhile
     a, mean = s.peaks / n, s.lengths / n
     Ku = fundamental(2.0 * mean) * s.effort / sqrt(a * a - s.hysteresis**2)
     spread = sqrt(max(s.squares / n - mean * mean, 0.0)) / mean
@@ -310,7 +310,7 @@ def tuned(axis: str, unit: str, signals: Mapping[str, Any], params: Mapping[str,
         if end["moved"]
         else ("give the run more time, or tune_cycles a smaller number")
     )
-    count = max(int(end["half_cycles"]) - SETTLING - 1, 0)
+    count = max(int(end["half_cycles"]) - SETTLING, 0)
     raise InputError(f"{axis}: the run ended after {count} of {params['tune_cycles']:g} half cycles; {cause}")
 
 

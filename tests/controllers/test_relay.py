@@ -204,8 +204,9 @@ def test_effort_is_raised_while_it_runs_until_the_axis_moves():
     motion, state, params, u = model.motion(model, T), relay.initial_state, relay.params, 0.0
     told = {}
     for k in range(4000):
-        if k in (500, 1000):
-            params = relay.retune(values | {"tune_effort": 0.2 if k == 500 else 4.0})
+        if k == 1500:
+            assert u == 0.0  # it had given up
+            params = relay.retune(values | {"tune_effort": 4.0})
         following = relay.control(k * T, Reference(0.0, 0.0, 0.0), motion.read(), state, params)
         u, state = following
         told = dict(zip(relay.signals, relay.observe(0.0, state, state, params), strict=True))
@@ -229,6 +230,21 @@ def test_tune_start_begins_anew_and_zero_ends_the_swing():
     assert not np.any(voltages[:200]) and not np.any(voltages[400:1000])
     assert min(np.abs(voltages[200:400])) > 2.0
     assert state.Ku > 0.0 and state.passed > 50
+
+
+def test_fewer_half_cycles_while_it_runs_leave_the_averages_right():
+    relay = library_controller("relay", {}, T, RANGE, tune_cycles=1000)
+    values = {name: float(relay.params[name]) for name in relay.tunable}
+    model = plant("X")
+    motion, state, params = model.motion(model, T), relay.initial_state, relay.params
+    for k in range(2000):
+        if k == 1500:
+            params = relay.retune(values | {"tune_cycles": 20.0})
+        u, state = relay.control(k * T, Reference(0.0, 0.0, 0.0), motion.read(), state, params)
+        motion.write(u)
+    usual, _, _ = signals(library_controller("relay", {}, T, RANGE), plant("X"), step(0.0, 2000))
+    assert state.Ku == pytest.approx(usual["ultimate_gain"], rel=0.05)
+    assert state.Tu == pytest.approx(usual["ultimate_period"], rel=0.05)
 
 
 def test_more_than_the_converter_gives_is_refused():
