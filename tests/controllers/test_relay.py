@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from math import pi, sin
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from control_loops import RANGE, T, plant, run, step
+from documents import ROOT
 from typer.testing import CliRunner
 
 import rds
@@ -144,22 +146,54 @@ def test_emulation_repeats_simulation_and_a_run_says_what_was_found():
 AXES = [(machine, axis) for machine in machine_names() for axis in load_machine(machine).axes]
 
 
+def tuned_late(machine, axis, delay=1):
+    """What the relay finds for an axis in a simulation whose voltages act `delay` samples late, and the result."""
+    about = load_machine(machine)
+    of = about.axis(axis)
+    late = {"actuator": {"kind": "constant", "delay": about.sample_period}} if delay else None
+    result = rds.Experiment(
+        machine=machine,
+        axis=axis,
+        duration=4.0 if about.sample_period < 0.01 else 6.0,
+        reference=rds.constant(0.3 * of.travel[1] if of.is_spindle else 0.0),
+        controller="relay",
+        network=late,
+    ).run()
+    return relay_gains(result, delay=delay), result
+
+
 @pytest.mark.parametrize("delay, least", [(0, 35.0), (1, 28.0)])
 @pytest.mark.parametrize("machine, axis", AXES)
 def test_every_axis_that_comes_with_rds_gets_a_stable_loop(machine, axis, delay, least):
-    about = load_machine(machine)
-    of = about.axis(axis)
-    place = 0.3 * of.travel[1] if of.is_spindle else 0.0
-    late = {"actuator": {"kind": "constant", "delay": about.sample_period}} if delay else None
-    samples = 4.0 if about.sample_period < 0.01 else 6.0
-    result = rds.Experiment(
-        machine=machine, axis=axis, duration=samples, reference=rds.constant(place), controller="relay", network=late
-    ).run()
-    found = relay_gains(result, delay=delay)
+    found, result = tuned_late(machine, axis, delay)
     assert found.phase_margin > least
     assert found.gain_margin > 4.0
-    error = abs(result[f"{axis}_measured"][-50:] - place).max()
-    assert error <= 1.01 * of.resolution
+    error = abs(result[f"{axis}_measured"] - result[f"{axis}_reference"])[-50:].max()
+    assert error <= 1.01 * load_machine(machine).axis(axis).resolution
+
+
+def test_the_document_has_the_numbers_that_come_out():
+    text = (ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")
+    rows = re.findall(
+        r"^\| `([\w-]+)` (\w+)[^|]* \| ([\d.]+) V/\S+ \| ([\d.]+) ms \| [^|]+ \| ([\d.]+), ([\d.]+), ([\d.]+) "
+        r"\| (\d+)° \| ([\d.]+) dB \|$",
+        text,
+        re.MULTILINE,
+    )
+    assert len(rows) == 9
+    for machine, axis, *numbers in rows:
+        found = tuned_late(machine, axis)[0]
+        law = found.controller()
+        gains = [law["Pgain"], law["Igain"], law["Dgain"]]
+        there = [found.found.ultimate_gain, 1e3 * found.found.ultimate_period, *gains]
+        assert there == pytest.approx([float(each) for each in numbers[:5]], rel=0.01), (machine, axis)
+        assert [found.phase_margin, found.gain_margin] == pytest.approx([float(each) for each in numbers[5:]], abs=0.6)
+
+
+def test_gains_of_a_simulation_have_half_the_phase_margin_on_a_bus():
+    result = rds.Experiment(axis="X", duration=2.0, reference=rds.constant(0.0), controller="relay").run()
+    assert relay_gains(result).phase_margin == pytest.approx(39.0, abs=1.0)
+    assert relay_gains(result, delay=1).phase_margin == pytest.approx(21.0, abs=1.0)
 
 
 def test_an_axis_that_friction_holds_is_refused_with_the_remedy():
