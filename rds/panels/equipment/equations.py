@@ -63,7 +63,7 @@ def _law(name: str, params: Mapping[str, Any], unit: str) -> list[str]:
         ]
     if name == "relay" and "tune_effort" in p:
         effort, band = _n(p["tune_effort"]), _n(p["hysteresis"])
-        return [f"u = ±{effort} V, changing over at e = ∓{band} {unit};   then PID by the rule {params['tune_type']}"]
+        return [f"u = ±{effort} V, changing over at e = ∓{band} {unit}, then PID by the rule {params['tune_type']}"]
     return [f"{name}: " + (", ".join(f"{key} = {_n(value)}" for key, value in p.items()) or "without params")]
 
 
