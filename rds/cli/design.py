@@ -1,4 +1,4 @@
-"""`rds design` and `rds machine from`: what a fitted model is for, and laws for a loop with delay."""
+"""`rds design` and `rds machine from`: what a fitted model is for, laws for a loop with delay, and gains by a relay."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from rds.cli.common import Json, print_json, refusals, writes_files
 if TYPE_CHECKING:
     from rds.identification.fit.design import Linear
 
-app = typer.Typer(no_args_is_help=True, help="Controllers designed from a fitted model, or for a loop with delay.")
+app = typer.Typer(
+    no_args_is_help=True, help="Controllers designed from a fitted model, for a loop with delay, or by a relay."
+)
 
 Model = Annotated[Path, typer.Argument(help="A model file, as `rds fit -o` writes it.")]
 
@@ -97,6 +99,35 @@ def lqg(
         return
     typer.echo(str(designed))
     typer.echo(designed.table() if out is None else f"wrote {out}")
+
+
+@app.command()
+@writes_files
+def relay(
+    run: Annotated[Path, typer.Argument(help="A saved run of the law relay: its folder or result file.")],
+    axis: Annotated[str | None, typer.Option(help="Which axis; by default the first that the law drove.")] = None,
+    delay: Annotated[
+        int | None,
+        typer.Option(min=0, max=200, help="Of the loop, samples, for the margins; by default 1 on a bus, else 0."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write the controller's table, FILE.toml.")] = None,
+    json: Json = False,
+) -> None:
+    """The gains that a run of the law relay found, as a table of a controller, and their margins by the run's model."""
+    with refusals():
+        from rds.core.atomic import keep_another, write_whole
+        from rds.identification.robustness.relay import RELAY, relay_gains
+
+        if out is not None:
+            keep_another(out, RELAY, "controller of `rds design relay`")
+        found = relay_gains(run, axis, delay)
+        if out is not None:
+            write_whole(out, found.table().encode())
+    if json:
+        print_json(found.to_json())
+        return
+    typer.echo(str(found))
+    typer.echo(found.table() if out is None else f"wrote {out}")
 
 
 def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:

@@ -11,7 +11,7 @@ A module of a law has
 - `law(position, velocity, acceleration, y, state, coefficients) -> (voltage, next_state)`, where a run may be compiled:
   the same on floats and tuples of floats alone, which numba compiles as it stands. `control` then calls it with
   `params["coefficients"]`. The laws for loops with delay (`lqg`, `smith`) keep voltages that are on their way: they
-  have no `law`.
+  have no `law`. `relay`, which changes from one law to another, has none either.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ LIBRARY = Registry(
         "cascade": "rds.controllers.cascade",
         "lqg": "rds.controllers.lqg",
         "smith": "rds.controllers.smith",
+        "relay": "rds.controllers.relay",
     },
 )
 

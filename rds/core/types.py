@@ -82,6 +82,7 @@ class Controller:
     `retune(values of all of them)` gives the parameters that follow from new values, or raises InputError. Without
     `retune`, any number in `params` may be changed and is handed to `control` as it is.
     One that is not `repeatable` answers differently when a run is gone through again, such as a person's loop.
+    `conclude(axis, unit, its recorded signals by name, params)` gives a sentence for the notes of the run.
     """
 
     control: Callable[..., Any]
@@ -94,6 +95,7 @@ class Controller:
     signals: Mapping[str, str] = field(default_factory=dict)
     observe: Callable[..., Sequence[float]] | None = None
     repeatable: bool = True
+    conclude: Callable[..., str] | None = None
 
     def __repr__(self) -> str:
         return _named(self)

@@ -9,6 +9,7 @@ __getattr__, __dir__ = face(
         "distributions": "robustness.plots",
         "linear_axis_of": "fit.design",
         "linear_axis_of_machine": "fit.design",
+        "relay_gains": "robustness.relay",
         "sentences": "robustness.summary",
         "tracking_design": "robustness.tracking_design",
         "tracking_system": "fit.design",

@@ -42,7 +42,7 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     if mode.followed and plan.controlled and plan.repeatable:
         columns |= _simulated(plan, rows, sample)
     meta = _description(plan, rows) | known
-    meta["notes"] += _beyond_travel(plan, columns)
+    meta["notes"] += _beyond_travel(plan, columns) + _concluded(plan, columns)
     if mode.real_time:
         meta |= _judged(plan, rows, sample)
         if note := bus_note(meta["drivers"], meta["bus"]):
@@ -64,6 +64,17 @@ def _beyond_travel(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
         said.append(
             f"{axis.name} was at {there}, beyond its travel of {low:g} to {high:g} {axis.unit}; look at {cause}"
         )
+    return said
+
+
+def _concluded(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
+    """What the law of each axis says about its run, from the signals that it had recorded."""
+    said = []
+    for part in plan.axes:
+        law, name = part.controller, part.axis.name
+        if law is not None and law.conclude is not None and len(next(iter(columns.values()))):
+            signals = {signal: columns[f"{name}_{signal}"] for signal in law.signals}
+            said.append(law.conclude(name, part.axis.unit, signals, law.params))
     return said
 
 

@@ -61,6 +61,9 @@ def _law(name: str, params: Mapping[str, Any], unit: str) -> list[str]:
             f"w_r = {_sum((p['Kpp'], '(r − y)'), (p['speed_feedforward'], 'ṙ'))} {unit}/s",
             f"i = {_sum((p['Kp'], '(w_r − w)'), (p['Ki'], '∫(w_r − w) dt'), (p['Kd'], 'd(w_r − w)/dt'))} A",
         ]
+    if name == "relay" and "tune_effort" in p:
+        effort, band = _n(p["tune_effort"]), _n(p["hysteresis"])
+        return [f"u = ±{effort} V, changing over at e = ∓{band} {unit}, then PID by the rule {params['tune_type']}"]
     return [f"{name}: " + (", ".join(f"{key} = {_n(value)}" for key, value in p.items()) or "without params")]
 
 

@@ -41,6 +41,7 @@ _CONTROLLERS = {
     "cascade": "Servo cascade",
     "lqg": "LQG",
     "smith": "Smith predictor",
+    "relay": "Relay autotuning",
 }
 MODELS = {"default": "Default", USER: "User-defined"}
 POLE, POLE_OFFSET, OBSERVER = f"{PREFIX}pole", f"{PREFIX}pole_imaginary", f"{PREFIX}observer_pole"
