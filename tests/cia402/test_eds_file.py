@@ -212,7 +212,7 @@ def test_an_xdd_is_told_as_xml(tmp_path: Path) -> None:
 
 def test_only_drives_have_an_eds(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["machine", "serve", "mini-cnc", "--eds", str(tmp_path / "x.eds")])
-    assert done.exit_code == 2 and "only simulated drives" in done.output
+    assert done.exit_code == 2 and "those of cia402 do" in done.output
     done = CliRunner().invoke(
         app, ["machine", "serve", "mini-cnc", "--dialect", "cia402", "--eds", str(tmp_path / "x.eds")]
     )
