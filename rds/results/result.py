@@ -11,6 +11,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
+from rds.core.types import Ending
 from rds.results.files import read_saved, save_all, save_result
 from rds.results.plain import plain
 from rds.results.units import default_unit
@@ -79,8 +80,10 @@ class Result:
         return len(self.columns["time"])
 
     def __repr__(self) -> str:
+        ending = self.meta.get("ending", Ending.DONE)
+        said = f", ended: {ending}" if ending != Ending.DONE else ""
         verdict = f", verdict {self.verdict}" if self.verdict else ""
-        return f"<Result: {self.mode or 'run'} of {', '.join(self.axes)}, {len(self)} samples{verdict}>"
+        return f"<Result: {self.mode or 'run'} of {', '.join(self.axes)}, {len(self)} samples{said}{verdict}>"
 
     @property
     def axes(self) -> list[str]:

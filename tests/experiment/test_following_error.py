@@ -26,7 +26,7 @@ def test_a_law_of_the_wrong_sign_ends_at_once_at_zero_volts_and_its_samples_are_
         out=tmp_path
     )
     error = np.abs(result["X_reference"] - result["X_measured"])
-    assert result.meta["ending"] == "following error"
+    assert result.meta["ending"] == "following error" and ", ended: following error" in repr(result)
     assert (error[:-1] <= 1.0).all() and 1.0 < error[-1] < 1.05
     assert abs(result["X_command"][-1]) > 10.0 and result["X_voltage"][-1] == 0.0
     assert "axis X was 1.0" in result.meta["ending_reason"] and "[following_error]" in result.meta["ending_reason"]
