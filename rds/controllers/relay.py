@@ -291,6 +291,8 @@ class Tuned:
 
 def tuned(axis: str, unit: str, signals: Mapping[str, Any], params: Mapping[str, Any]) -> Tuned:
     """What the recorded `signals` of one axis tell; InputError with a remedy where the experiment found no gains."""
+    if not len(signals[SIGNALS[0]]):
+        raise InputError(f"{axis}: the run has no samples, so there are no gains")
     end = {name: float(signals[name][-1]) for name in SIGNALS}
     if end["tuning"] == HOLDING:
         rule, Ku, Tu = str(params["tune_type"]), end["ultimate_gain"], end["ultimate_period"]

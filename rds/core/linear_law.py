@@ -77,7 +77,8 @@ def _in_proportion(change: Callable[[float, int | None], np.ndarray], index: int
     """The answer to a change of one number (None: of y); InputError where twice as much does not answer twice."""
     once, twice, back = (change(size, index) for size in (_STEP, 2.0 * _STEP, -_STEP))
     size = max(np.abs(once).max(), 1e-12)
-    if max(np.abs(once - twice).max(), np.abs(once - back).max()) > _IN_PROPORTION * size + 1e-9:
+    is_finite = np.isfinite([once, twice, back]).all()
+    if not is_finite or max(np.abs(once - twice).max(), np.abs(once - back).max()) > _IN_PROPORTION * size + 1e-9:
         raise InputError(
             f"controller {name!r} does not answer in proportion about rest (a limit, friction compensated by "
             "direction); the analysis is of linear laws: leave that out for it"

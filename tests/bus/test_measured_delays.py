@@ -244,6 +244,11 @@ def test_logs_of_something_else_are_refused() -> None:
         of_frames(cnc(), two)
 
 
+def test_a_log_of_answers_alone_has_no_delays() -> None:
+    said = str(of_frames(cnc(), [frame(0x021, k * 1e-3) for k in range(3)]))
+    assert "no message of the log has a delay that can be measured" in said
+
+
 def test_drives_are_measured_by_their_sync() -> None:
     """A run of one drive of four: SYNC, its TPDO 0.3 ms later, its RPDO 0.5 ms after that."""
     analysis = analyse(load_machine("mini-cnc"), 500_000, 5e-3, dialect="cia402", response_time=4e-4, host_jitter=4e-4)

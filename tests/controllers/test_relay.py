@@ -18,6 +18,7 @@ import rds
 from rds.cli.main import app
 from rds.controllers import library_controller
 from rds.core.errors import InputError
+from rds.core.linear_law import linear_law
 from rds.core.types import Reference
 from rds.identification import relay_gains
 from rds.machines import load_machine, machine_names
@@ -223,6 +224,11 @@ def test_a_run_that_is_too_short_says_how_far_it_came():
     result = rds.Experiment(axis="X", duration=0.3, reference=rds.constant(0.0), controller="relay").run()
     with pytest.raises(InputError, match=r"ended after \d+ of 50 half cycles; give the run more time"):
         relay_gains(result)
+
+
+def test_a_relay_has_no_linear_part():
+    with pytest.raises(InputError, match="does not answer in proportion about rest"):
+        linear_law(library_controller("relay", load_machine("mini-cnc").axes["X"].model, T, RANGE))
 
 
 def test_a_run_of_another_law_has_no_relay_gains():

@@ -72,6 +72,19 @@ def test_one_axis_ends_all() -> None:
     assert abs(result["X_voltage"][-2]) > 0.0
 
 
+def test_the_last_sample_counts_as_the_others_do() -> None:
+    """Where only the end point is off, the run is not done."""
+    result = run({"ferror": 0.5}, reference={"kind": "constant", "value": 2.0}, duration=0.001)
+    assert len(result) == 1 and result.meta["ending"] == "following error"
+
+
+def test_the_repetition_of_a_run_that_it_ended_goes_through_all_its_samples(tmp_path: Path) -> None:
+    """The second look at a late run hands the laws no voltages."""
+    experiment = rds.Experiment(controller="p", reference=SINE, following_error={"ferror": 0.01}, duration=1.0)
+    assert all(axis.following_error is None for axis in experiment.plan().unwatched().axes)
+    assert any(axis.following_error is not None for axis in experiment.plan().axes)
+
+
 def test_a_part_program_ends_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("part.ngc").write_text("G21 G90\nG1 X5 F600\nM2\n")
@@ -98,6 +111,7 @@ def test_a_spindle_is_not_watched() -> None:
         ({"following_error": {"ferror": 0.0}}, "ferror = 0.0 must be more than 0 axis unit"),
         ({"following_error": {"ferror": 1.0, "min_ferror": 2.0}}, "min_ferror = 2.0 must be at most ferror, 1"),
         ({"following_error": {"ferror": 1.0, "ferorr": 2.0}}, "unknown key 'ferorr'.*did you mean 'ferror'"),
+        ({"following_error": {"ferror": 1.0}, "controller": "relay", "error_compensation": {}}, "leave it out"),
         (
             {"following_error": {"ferror": 1.0}, "controller": None, "reference": None, "signal": SINE},
             "there is no following error",

@@ -80,6 +80,8 @@ def tracking(measured: Measured) -> list[str]:
     """What the delays are to a loop that is closed over this bus."""
     if not measured.cycle:
         rows = [row for row in measured.rows if row.largest is not None]
+        if not rows:
+            return ["Tracking: no message of the log has a delay that can be measured."]
         worst = max(rows, key=lambda row: (row.largest or 0.0) / row.period)
         share = 100.0 * (worst.largest or 0.0) / worst.period
         return [

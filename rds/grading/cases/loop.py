@@ -63,6 +63,8 @@ def run_loop(plan: Plan, meta: dict[str, Any]) -> LoopRun:
         ending = loop.run() or Ending.DONE
     except ContractError as error:  # of the encoder, about a position that is no number
         fault = f"at t = {loop.k * plan.T:.3f} s {str(error).partition(';')[0]}: the loop is not stable"
+    if ending is Ending.FOLLOWING_ERROR and loop.changes is not None:
+        fault = loop.changes.reason
     values = np.frombuffer(recorded).reshape(-1, len(columns))
     made, of = table(columns, units, values, plan.T)
     about = {"axes": plan.names, "sample_period": plan.T, "mode": mode.name, "ending": str(ending), **meta}

@@ -80,9 +80,7 @@ def _concluded(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
 
 def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarray]:
     """Each axis's response in a closed loop of its own: the same plan, simulated, for as long as the run lasted."""
-    same = as_recorded(plan, rows)
-    unwatched = tuple(replace(axis, following_error=None) for axis in same.axes)  # the run has ended where it did
-    same = replace(same, axes=unwatched, mode=SIMULATION, samples=int(sample[-1]) + 1)
+    same = replace(as_recorded(plan, rows).unwatched(), mode=SIMULATION, samples=int(sample[-1]) + 1)
     simulated = run_plan(same, None)
     of = dict(zip(simulated.columns, simulated.values.T, strict=True))
     return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}

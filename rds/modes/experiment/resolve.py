@@ -279,6 +279,10 @@ def _compensated(table: TomlTable, setting: Setting, controller: Controller | No
         )
     if setting.command is Command.PROFILE or axis.is_spindle:
         return controller
+    if controller.source.name == "relay":
+        raise InputError(
+            "[error_compensation] moves the reference, about which the law relay swings; leave it out", table.place()
+        )
     return compensated(controller, setting.T, time, most, axis.unit)
 
 

@@ -82,8 +82,10 @@ class LiveChanges:
             for name, value in zip(self._names, live_values.take(), strict=False):
                 if value != values[name]:
                     self._apply(k, name, value)
-        if self._ending is not None:
-            return self._ending
+        return self._ending if self._ending is not None else self.at_end()
+
+    def at_end(self) -> Ending | None:
+        """How what drives the axes ends the run, if it does: asked after the last sample, too."""
         if self._over is None or (over := self._over()) is None:
             return None
         ending, self.reason = over

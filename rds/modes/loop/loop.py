@@ -75,6 +75,8 @@ class Loop:
                 k += 1
                 if ending is not None:
                     return ending
-            return Ending.DONE if k >= samples else None
+            if k < samples:
+                return None
+            return (changes.at_end() if changes is not None else None) or Ending.DONE
         finally:
             self.k = k

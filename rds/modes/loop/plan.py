@@ -158,8 +158,15 @@ class Plan:
         def ends() -> tuple[Ending, str] | None:
             return (guard.over() if guard is not None else None) or execution.over()
 
-        changes = LiveChanges(self.channels(), actions | execution.actions(), self.changes, ends, execution.waits)
+        def waits() -> bool:
+            return (guard is None or guard.over() is None) and execution.waits()
+
+        changes = LiveChanges(self.channels(), actions | execution.actions(), self.changes, ends, waits)
         return Drive([execution.law, *self._laws(params, list(live.values())), *last], changes, sets_references=True)
+
+    def unwatched(self) -> Plan:
+        """The same run, that no following error ends: to go through it again, which ended where it did."""
+        return replace(self, axes=tuple(replace(axis, following_error=None) for axis in self.axes))
 
     def _guard(self) -> FollowingGuard | None:
         """What ends the run where an axis is too far from its reference."""

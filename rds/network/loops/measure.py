@@ -228,7 +228,7 @@ def _loop(
             positions = drivers.exchange()
             received = now()
             voltages: list[float] = []
-            row: list[float] = []
+            row: list[float] = [k]
             for law in laws:
                 law(k % plan.samples, positions, row, voltages)
             computed = now()
