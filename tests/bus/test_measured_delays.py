@@ -245,7 +245,7 @@ def test_logs_of_something_else_are_refused() -> None:
 
 
 def test_a_log_of_answers_alone_has_no_delays() -> None:
-    said = str(of_frames(cnc(), [frame(0x021, k * 1e-3) for k in range(3)]))
+    said = str(of_frames(cnc(), [frame(0x022, k * 1e-3) for k in range(3)]))
     assert "no message of the log has a delay that can be measured" in said
 
 

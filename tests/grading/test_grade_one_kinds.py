@@ -168,6 +168,19 @@ def test_a_part_program_on_coupled_axes_is_judged_by_its_contour(tmp_path: Path,
     assert sorted(path.name for path in folder.iterdir()) == ["assignment.toml", "part.ngc", "solution.py"]
 
 
+def test_a_program_that_a_following_error_ended_earns_nothing_for_what_it_did_not_do(
+    tmp_path: Path, pool: Pool
+) -> None:
+    law = "def control(t, r, y, state, params):\n    return (30.0 if t < 0.05 else -30.0) * (r.position - y), state\n"
+    text = HEAD + '[[case]]\nname = "sine"\nprogram = "part.ngc"\n[case.following_error]\nferror = 0.5\n'
+    text += RMS.replace('"rms"', '"max"').replace("rms-error", "max-error")
+    tmp_path.joinpath("part.ngc").write_text(PART)
+    folder = assignment_in(tmp_path, text, law)
+    found = grade_with_runs(read_assignment(folder), folder / "solution.py", "ada", pool)
+    assert found.grade.score == 0.0
+    assert "[following_error]" in str(found.grade)
+
+
 def test_numbers_beyond_measure_are_the_submission_s_fault_and_not_the_grader_s(tmp_path: Path, pool: Pool) -> None:
     line = '[case.segment]\nkind = "line"\nstart = [0.0]\nend = [1.0]\nfeed_rate = 10.0\n'
     errors = RMS.replace("rms-error", "path-error")
