@@ -17,7 +17,7 @@ from rds.bus.modules.oacs.several import Several, VirtualPort
 from rds.cli.main import app
 from rds.core.errors import InputError, MachineError
 from rds.nc.language.dialect import Dialect
-from rds.nc.run.module_moves import MovesRun, moves_report, run_moves
+from rds.nc.run.module_moves import MovesRun, moves_report, require_start, run_moves
 from rds.nc.setup import Setup
 
 # the thesis's program, section 7.3, as it is printed
@@ -107,6 +107,26 @@ class Bench:
         self.host = Several(self.port, {DATA[name].node: name for name in self.modules})
 
 
+def test_axes_that_stand_off_the_start_are_told_before_anything_moves() -> None:
+    """Also one that the program never moves, as `G0 X0` off the zero does not; Z, which may be in a hole, first."""
+    bench = Bench()
+    data = {name: DATA[name] for name in bench.modules}
+    start = dict.fromkeys("XZ", 0.0)
+    require_start(bench.host, data, start)
+    bench.host.to({data["X"].node: 3.0, data["Z"].node: -3.0}, 60.0)
+    with pytest.raises(
+        MachineError, match=r"^Z stands at -3\S* mm, X stands at 3\S* mm, .*begins with Z at 0, X at 0"
+    ) as e:
+        require_start(bench.host, data, start)
+    away, across = (f"`rds module {data[name].node} move --to 0`" for name in "ZX")
+    assert f"Z first, in the Jog panel or by {away}, then {across}" in str(e.value)
+    bench.host.rest(2.0)
+    assert bench.modules["X"].plant.true_position == pytest.approx(3.0, abs=0.6), "it was not taken there"
+    bench.host.to({data["Z"].node: 0.0}, 60.0)
+    with pytest.raises(MachineError, match=r"^X stands at 3"):
+        require_start(bench.host, data, start)
+
+
 def test_a_tool_turns_at_its_speed_until_it_is_stopped() -> None:
     bench = Bench()
     node = next(data.node for data in DATA.values() if data.kind == Kind.TOOL)
@@ -167,12 +187,16 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.realtime
 def test_served_modules_carry_the_same_out(serve: Any, channel: str, tmp_path: Path) -> None:
-    serve("X,Z,drill")
-    text = "G21 G90\nS300 M3\nG0 X1\nG1 Z-0.5 F60\nM5\nM2\n"
+    serve()
+    text = "G21 G90\nS300 M3\nG0 X1\nG1 Z-1.5 F60\nM5\nM2\n"
     run = carried_out(tmp_path, text, mode="implementation", channel=channel)
     virtual = carried_out(tmp_path, text)
-    assert [(m.line, m.axis, m.end, m.gauge) for m in run.moves] == [(3, "X", 1.0, None), (4, "Z", -0.5, None)]
+    assert [(m.line, m.axis, m.end, m.gauge) for m in run.moves] == [(3, "X", 1.0, None), (4, "Z", -1.5, None)]
     for real, meant in zip(run.moves, virtual.moves, strict=True):
         assert real.arrived == pytest.approx(meant.arrived, abs=0.1)
     with pytest.raises(InputError, match="modules that are served already keep their tuning"):
         carried_out(tmp_path, text, mode="implementation", channel=channel, tuning={"Kp": 2.0})
+    with pytest.raises(
+        MachineError, match=r"^Z stands at -1.\d+ mm, .*the program begins with Z at 0.*nothing has moved"
+    ):
+        carried_out(tmp_path, "G21 G90\nG0 X2\nM2\n", mode="implementation", channel=channel)
