@@ -95,6 +95,28 @@ def test_what_move_commands_cannot_do_is_refused(tmp_path: Path, text: str, opti
         carried_out(tmp_path, text, **options)
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("G21 G90\nG0 X2\nM0\nG0 X4\nM2\n", r"line 3 waits for somebody .* line 4 moves on"),
+        ("G21 G90\nM1\nG4 P1\nG0 X4\nM2\n", r"line 2 waits for somebody .* line 4 moves on"),
+        ("G21 G90\nT1 M6\nG0 X2\nM2\n", r"line 2 changes the tool"),
+        ("G21 G90\nG0 X2\nT1 M6\nG0 X4\nM2\n", r"line 3 changes the tool"),
+    ],
+)
+def test_real_modules_do_not_move_on_where_somebody_has_to_be_waited_for(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "tools.tbl").write_text("T1 P1 D4\n")
+    setup = Setup(tools=tmp_path / "tools.tbl")
+    with pytest.raises(InputError, match=says):
+        carried_out(tmp_path, text, mode="implementation", channel="nobody", setup=setup)
+    assert len(carried_out(tmp_path, text, setup=setup).moves) == text.count("X"), "in a simulation no hands are near"
+
+
+def test_a_stop_at_the_end_of_a_program_is_no_hindrance(channel: str, tmp_path: Path) -> None:
+    with pytest.raises(MachineError, match="did not answer"):  # the bus is empty, and was asked
+        carried_out(tmp_path, "G21 G90\nG0 X2\nM0\nM2\n", mode="implementation", channel=channel)
+
+
 class Bench:
     """X, Z and the drill in virtual time."""
 

@@ -111,6 +111,8 @@ def run_moves(
     blocks = list(compiled_form(file, machine, setup or Setup(), progress).blocks())
     rows = [row for block in blocks for row in block.segments]
     _require_points(rows, file)
+    if mode != SIMULATION:
+        _require_no_hands(blocks, file)
     modules = read_modules(machine)
     chosen = _tuning(tuning or {})
     notes = ["F is not obeyed: each module moves at the speed of its own controller."]
@@ -260,6 +262,27 @@ def _require_points(rows: Sequence[np.void], file: Path) -> None:
             )
     if not any((row["start"] != row["end"]).any() for row in rows):
         raise InputError("nothing in it moves: there is nothing to run", str(file))
+
+
+def _require_no_hands(blocks: Sequence[PathBlock], file: Path) -> None:
+    """InputError for a program that stops for somebody's hands, which a run that does not stop would meet."""
+    stopped = None
+    for row, events in _in_order(blocks):
+        if stopped is not None and row is not None and (row["start"] != row["end"]).any():
+            raise InputError(
+                f"line {stopped} waits for somebody (M0, M1) and line {row['line']} moves on, but move commands do not "
+                "wait: end the program at the stop and make the rest another one, or leave --method out",
+                str(file),
+            )
+        for event in events:
+            if event.kind == "tool":
+                raise InputError(
+                    f"line {event.line} changes the tool (M6), and move commands do not wait for it: make a program "
+                    "for each tool, without M6, or leave --method out",
+                    str(file),
+                )
+            if event.kind == "stop":
+                stopped = event.line
 
 
 def _virtual(machine: Machine, modules: Mapping[str, ModuleData]) -> dict[str, OacsModule]:
