@@ -10,7 +10,9 @@ import pytest
 from oacs_bench import MACHINE
 from typer.testing import CliRunner
 
-from rds.bus.modules.oacs.codes import Kind
+from rds.bus.modules.oacs.codes import Acknowledges, Kind
+from rds.bus.modules.oacs.link import acknowledgement
+from rds.bus.modules.oacs.messages import Decoded
 from rds.bus.modules.oacs.module import OacsModule
 from rds.bus.modules.oacs.module_data import read_modules
 from rds.bus.modules.oacs.several import Several, VirtualPort
@@ -28,6 +30,7 @@ EXACT = {"controller": "PI", "Kp": 8.0, "Ki": 20.0, "integral_limit": 1000.0, "o
     "tolerance": 2.0,
 }
 DATA = read_modules(MACHINE)
+END_OF_TURNING = acknowledgement(Acknowledges.START, last=True)
 
 
 def carried_out(folder: Path, text: str, **options: Any) -> MovesRun:
@@ -161,6 +164,24 @@ def test_a_tool_turns_at_its_speed_until_it_is_stopped() -> None:
     bench.host.turn(node, 0.0)
     bench.host.rest(3.0)
     assert bench.modules["drill"].plant.velocity == pytest.approx(0.0, abs=0.5)
+
+
+def test_a_tool_that_does_not_come_to_rest_is_named() -> None:
+    bench = Bench()
+
+    class Deaf(VirtualPort):
+        """Hears nothing of the end of a tool's turning."""
+
+        def hear(self, until: float) -> Decoded | None:
+            while (said := super().hear(until)) is not None and END_OF_TURNING(said):
+                pass
+            return said
+
+    node = DATA["drill"].node
+    host = Several(Deaf(list(bench.modules.values())), {DATA[name].node: name for name in bench.modules})
+    host.turn(node, 300.0)
+    with pytest.raises(MachineError, match=r"^drill was told to stop and did not say within 60 s that it is at rest"):
+        host.turn(node, 0.0)
 
 
 def test_a_module_that_refuses_is_named_and_all_stop() -> None:
