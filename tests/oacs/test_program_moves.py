@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from rds.bus.modules.oacs.codes import Acknowledges, Kind
 from rds.bus.modules.oacs.link import acknowledgement
-from rds.bus.modules.oacs.messages import Decoded
+from rds.bus.modules.oacs.messages import Decoded, Frame, decode
 from rds.bus.modules.oacs.module import OacsModule
 from rds.bus.modules.oacs.module_data import read_modules
 from rds.bus.modules.oacs.several import Several, VirtualPort
@@ -192,6 +192,31 @@ def test_a_module_that_refuses_is_named_and_all_stop() -> None:
     bench.host.rest(1.0)
     assert bench.modules["X"].plant.voltage == 0.0 and abs(bench.modules["X"].plant.velocity) == 0.0
     assert bench.modules["X"].plant.true_position < 1.0
+
+
+def test_a_stop_that_does_not_reach_one_module_is_told_to_the_others() -> None:
+    bench = Bench()
+
+    class Broken(VirtualPort):
+        """Sends nothing to X, once it is broken."""
+
+        broken = False
+
+        def send(self, frame: Frame) -> None:
+            if self.broken and decode(*frame).node == DATA["X"].node:
+                raise MachineError("the bus is broken")
+            super().send(frame)
+
+    port = Broken(list(bench.modules.values()))
+    host = Several(port, {DATA[name].node: name for name in ("X", "drill")})
+    host.turn(DATA["drill"].node, 300.0)
+    host.rest(1.0)
+    port.broken = True
+    with pytest.raises(MachineError, match="the bus is broken"):
+        host.stop()
+    port.broken = False
+    host.rest(1.0)
+    assert bench.modules["drill"].plant.voltage == 0.0
 
 
 def test_a_module_that_is_not_there_is_named_and_all_stop() -> None:

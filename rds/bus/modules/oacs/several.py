@@ -169,10 +169,16 @@ class Several:
                 pass
 
     def stop(self) -> None:
-        """Zero volts on all of them, now, whatever they do."""
+        """Zero volts on all of them, now, whatever they do. It raises after all have been told, if one could not be."""
+        failed = None
         for number in self._names:
-            self._send(number, Code=Code.MOVE, Move=Move.STOP)
+            try:
+                self._send(number, Code=Code.MOVE, Move=Move.STOP)
+            except BaseException as error:  # a second Ctrl-C, too, comes after the last has been told
+                failed = failed or error
         self._turning.clear()
+        if failed is not None:
+            raise failed
 
     # --- parts
 
