@@ -10,6 +10,7 @@ import pytest
 from oacs_bench import MACHINE
 from typer.testing import CliRunner
 
+from rds.bus.hub.command import Command, commanded
 from rds.bus.modules.oacs.codes import Acknowledges, Kind
 from rds.bus.modules.oacs.link import acknowledgement
 from rds.bus.modules.oacs.messages import Decoded, Frame, decode
@@ -18,8 +19,10 @@ from rds.bus.modules.oacs.module_data import read_modules
 from rds.bus.modules.oacs.several import Several, VirtualPort
 from rds.cli.main import app
 from rds.core.errors import InputError, MachineError
+from rds.machines import load_machine
 from rds.nc.language.dialect import Dialect
 from rds.nc.run.module_moves import MovesRun, moves_report, require_start, run_moves
+from rds.nc.run.node_methods import nodes_of, run_together
 from rds.nc.setup import Setup
 
 # the thesis's program, section 7.3, as it is printed
@@ -118,6 +121,25 @@ def test_real_modules_do_not_move_on_where_somebody_has_to_be_waited_for(tmp_pat
 def test_a_stop_at_the_end_of_a_program_is_no_hindrance(channel: str, tmp_path: Path) -> None:
     with pytest.raises(MachineError, match="did not answer"):  # the bus is empty, and was asked
         carried_out(tmp_path, "G21 G90\nG0 X2\nM0\nM2\n", mode="implementation", channel=channel)
+
+
+def test_modules_that_another_run_commands_are_left_alone(channel: str, tmp_path: Path) -> None:
+    """By move commands, and by method A of modules on CAN."""
+    cnc = load_machine("mini-cnc")
+    (tmp_path / "line.ngc").write_text("G21 G90 F300\nG1 X1\nM2\n")
+    with Command(channel):
+        with pytest.raises(MachineError, match=f"another run commands the machine on channel '{channel}'"):
+            carried_out(tmp_path, HOLE, mode="implementation", channel=channel)
+        for mode in ("emulation", "implementation"):
+            with pytest.raises(MachineError, match="another run commands"):
+                run_together(
+                    *(nodes_of(cnc), ["A"], tmp_path / "line.ngc", cnc, Setup()),
+                    mode=mode,
+                    channel=channel,
+                )
+    with pytest.raises(MachineError, match="did not answer"):  # it has gone
+        carried_out(tmp_path, HOLE, mode="implementation", channel=channel)
+    assert not commanded(channel), "a run that fails gives the command back"
 
 
 class Bench:

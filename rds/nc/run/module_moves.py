@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rds.bus.hub.command import Command
 from rds.bus.modules.oacs.codes import Kind, MessageToHost, Select
 from rds.bus.modules.oacs.messages import Decoded
 from rds.bus.modules.oacs.module import OacsModule
@@ -298,12 +299,17 @@ def _starts_modules(channel: str | None, interface: str) -> bool:
 
 
 def _bus(machine: Machine, channel: str | None, interface: str, bitrate: int, stack: ExitStack) -> BusPort:
-    """A bus with the modules on it; they are started for this run where no channel and no other bus is said."""
+    """A bus with the modules on it, and the command of it, as long as `stack` is open.
+
+    The modules are started for this run where no channel and no other bus is said.
+    """
     from rds.bus.modules.server_process import end_server, start_server
 
     if _starts_modules(channel, interface):
         channel = f"{machine.name[:20]}-{secrets.token_hex(4)}"
         stack.callback(end_server, start_server("oacs", machine.path, channel))
+    if interface == BUILTIN:
+        stack.enter_context(Command(str(channel)))
     bus = open_bus(interface, channel, None, node="host", **({} if interface == BUILTIN else {"bitrate": bitrate}))
     stack.callback(bus.shutdown)
     return BusPort(bus)
