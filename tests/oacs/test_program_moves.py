@@ -10,14 +10,19 @@ import pytest
 from oacs_bench import MACHINE
 from typer.testing import CliRunner
 
-from rds.bus.modules.oacs.codes import Kind
+from rds.bus.hub.command import Command, commanded
+from rds.bus.modules.oacs.codes import Acknowledges, Kind
+from rds.bus.modules.oacs.link import acknowledgement
+from rds.bus.modules.oacs.messages import Decoded, Frame, decode
 from rds.bus.modules.oacs.module import OacsModule
 from rds.bus.modules.oacs.module_data import read_modules
 from rds.bus.modules.oacs.several import Several, VirtualPort
 from rds.cli.main import app
 from rds.core.errors import InputError, MachineError
+from rds.machines import load_machine
 from rds.nc.language.dialect import Dialect
-from rds.nc.run.module_moves import MovesRun, moves_report, run_moves
+from rds.nc.run.module_moves import MovesRun, moves_report, require_start, run_moves
+from rds.nc.run.node_methods import nodes_of, run_together
 from rds.nc.setup import Setup
 
 # the thesis's program, section 7.3, as it is printed
@@ -28,6 +33,7 @@ EXACT = {"controller": "PI", "Kp": 8.0, "Ki": 20.0, "integral_limit": 1000.0, "o
     "tolerance": 2.0,
 }
 DATA = read_modules(MACHINE)
+END_OF_TURNING = acknowledgement(Acknowledges.START, last=True)
 
 
 def carried_out(folder: Path, text: str, **options: Any) -> MovesRun:
@@ -95,6 +101,47 @@ def test_what_move_commands_cannot_do_is_refused(tmp_path: Path, text: str, opti
         carried_out(tmp_path, text, **options)
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("G21 G90\nG0 X2\nM0\nG0 X4\nM2\n", r"line 3 waits for somebody .* line 4 moves on"),
+        ("G21 G90\nM1\nG4 P1\nG0 X4\nM2\n", r"line 2 waits for somebody .* line 4 moves on"),
+        ("G21 G90\nT1 M6\nG0 X2\nM2\n", r"line 2 changes the tool"),
+        ("G21 G90\nG0 X2\nT1 M6\nG0 X4\nM2\n", r"line 3 changes the tool"),
+    ],
+)
+def test_real_modules_do_not_move_on_where_somebody_has_to_be_waited_for(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "tools.tbl").write_text("T1 P1 D4\n")
+    setup = Setup(tools=tmp_path / "tools.tbl")
+    with pytest.raises(InputError, match=says):
+        carried_out(tmp_path, text, mode="implementation", channel="nobody", setup=setup)
+    assert len(carried_out(tmp_path, text, setup=setup).moves) == text.count("X"), "in a simulation no hands are near"
+
+
+def test_a_stop_at_the_end_of_a_program_is_no_hindrance(channel: str, tmp_path: Path) -> None:
+    with pytest.raises(MachineError, match="did not answer"):  # the bus is empty, and was asked
+        carried_out(tmp_path, "G21 G90\nG0 X2\nM0\nM2\n", mode="implementation", channel=channel)
+
+
+def test_modules_that_another_run_commands_are_left_alone(channel: str, tmp_path: Path) -> None:
+    """By move commands, and by method A of modules on CAN."""
+    cnc = load_machine("mini-cnc")
+    (tmp_path / "line.ngc").write_text("G21 G90 F300\nG1 X1\nM2\n")
+    with Command(channel):
+        with pytest.raises(MachineError, match=f"another run commands the machine on channel '{channel}'"):
+            carried_out(tmp_path, HOLE, mode="implementation", channel=channel)
+        for mode in ("emulation", "implementation"):
+            with pytest.raises(MachineError, match="another run commands"):
+                run_together(
+                    *(nodes_of(cnc), ["A"], tmp_path / "line.ngc", cnc, Setup()),
+                    mode=mode,
+                    channel=channel,
+                )
+    with pytest.raises(MachineError, match="did not answer"):  # it has gone
+        carried_out(tmp_path, HOLE, mode="implementation", channel=channel)
+    assert not commanded(channel), "a run that fails gives the command back"
+
+
 class Bench:
     """X, Z and the drill in virtual time."""
 
@@ -105,6 +152,26 @@ class Bench:
         }
         self.port = VirtualPort(list(self.modules.values()))
         self.host = Several(self.port, {DATA[name].node: name for name in self.modules})
+
+
+def test_axes_that_stand_off_the_start_are_told_before_anything_moves() -> None:
+    """Also one that the program never moves, as `G0 X0` off the zero does not; Z, which may be in a hole, first."""
+    bench = Bench()
+    data = {name: DATA[name] for name in bench.modules}
+    start = dict.fromkeys("XZ", 0.0)
+    require_start(bench.host, data, start)
+    bench.host.to({data["X"].node: 3.0, data["Z"].node: -3.0}, 60.0)
+    with pytest.raises(
+        MachineError, match=r"^Z stands at -3\S* mm, X stands at 3\S* mm, .*begins with Z at 0, X at 0"
+    ) as e:
+        require_start(bench.host, data, start)
+    away, across = (f"`rds module {data[name].node} move --to 0`" for name in "ZX")
+    assert f"Z first, in the Jog panel or by {away}, then {across}" in str(e.value)
+    bench.host.rest(2.0)
+    assert bench.modules["X"].plant.true_position == pytest.approx(3.0, abs=0.6), "it was not taken there"
+    bench.host.to({data["Z"].node: 0.0}, 60.0)
+    with pytest.raises(MachineError, match=r"^X stands at 3"):
+        require_start(bench.host, data, start)
 
 
 def test_a_tool_turns_at_its_speed_until_it_is_stopped() -> None:
@@ -121,6 +188,24 @@ def test_a_tool_turns_at_its_speed_until_it_is_stopped() -> None:
     assert bench.modules["drill"].plant.velocity == pytest.approx(0.0, abs=0.5)
 
 
+def test_a_tool_that_does_not_come_to_rest_is_named() -> None:
+    bench = Bench()
+
+    class Deaf(VirtualPort):
+        """Hears nothing of the end of a tool's turning."""
+
+        def hear(self, until: float) -> Decoded | None:
+            while (said := super().hear(until)) is not None and END_OF_TURNING(said):
+                pass
+            return said
+
+    node = DATA["drill"].node
+    host = Several(Deaf(list(bench.modules.values())), {DATA[name].node: name for name in bench.modules})
+    host.turn(node, 300.0)
+    with pytest.raises(MachineError, match=r"^drill was told to stop and did not say within 60 s that it is at rest"):
+        host.turn(node, 0.0)
+
+
 def test_a_module_that_refuses_is_named_and_all_stop() -> None:
     bench = Bench()
     bench.modules["Z"].set_emergency_input(True, 0.0)
@@ -129,6 +214,31 @@ def test_a_module_that_refuses_is_named_and_all_stop() -> None:
     bench.host.rest(1.0)
     assert bench.modules["X"].plant.voltage == 0.0 and abs(bench.modules["X"].plant.velocity) == 0.0
     assert bench.modules["X"].plant.true_position < 1.0
+
+
+def test_a_stop_that_does_not_reach_one_module_is_told_to_the_others() -> None:
+    bench = Bench()
+
+    class Broken(VirtualPort):
+        """Sends nothing to X, once it is broken."""
+
+        broken = False
+
+        def send(self, frame: Frame) -> None:
+            if self.broken and decode(*frame).node == DATA["X"].node:
+                raise MachineError("the bus is broken")
+            super().send(frame)
+
+    port = Broken(list(bench.modules.values()))
+    host = Several(port, {DATA[name].node: name for name in ("X", "drill")})
+    host.turn(DATA["drill"].node, 300.0)
+    host.rest(1.0)
+    port.broken = True
+    with pytest.raises(MachineError, match="the bus is broken"):
+        host.stop()
+    port.broken = False
+    host.rest(1.0)
+    assert bench.modules["drill"].plant.voltage == 0.0
 
 
 def test_a_module_that_is_not_there_is_named_and_all_stop() -> None:
@@ -167,12 +277,16 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.realtime
 def test_served_modules_carry_the_same_out(serve: Any, channel: str, tmp_path: Path) -> None:
-    serve("X,Z,drill")
-    text = "G21 G90\nS300 M3\nG0 X1\nG1 Z-0.5 F60\nM5\nM2\n"
+    serve()
+    text = "G21 G90\nS300 M3\nG0 X1\nG1 Z-1.5 F60\nM5\nM2\n"
     run = carried_out(tmp_path, text, mode="implementation", channel=channel)
     virtual = carried_out(tmp_path, text)
-    assert [(m.line, m.axis, m.end, m.gauge) for m in run.moves] == [(3, "X", 1.0, None), (4, "Z", -0.5, None)]
+    assert [(m.line, m.axis, m.end, m.gauge) for m in run.moves] == [(3, "X", 1.0, None), (4, "Z", -1.5, None)]
     for real, meant in zip(run.moves, virtual.moves, strict=True):
         assert real.arrived == pytest.approx(meant.arrived, abs=0.1)
     with pytest.raises(InputError, match="modules that are served already keep their tuning"):
         carried_out(tmp_path, text, mode="implementation", channel=channel, tuning={"Kp": 2.0})
+    with pytest.raises(
+        MachineError, match=r"^Z stands at -1.\d+ mm, .*the program begins with Z at 0.*nothing has moved"
+    ):
+        carried_out(tmp_path, "G21 G90\nG0 X2\nM2\n", mode="implementation", channel=channel)

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.bus.hub.command import Command
 from rds.bus.medium.bits import longest
 from rds.bus.modules.course import Course
 from rds.bus.modules.drift import drift_by_axis, drifts
@@ -150,7 +151,8 @@ def _bus(
     options: Mapping[str, Any],
     stack: ExitStack,
 ) -> tuple[MotionPort, str, Path | None]:
-    """A bus with the modules on it, and the file of their dial gauges if they are started for this run."""
+    """A bus with the modules on it and the command of it, as long as `stack` is open, and the file of the modules' dial
+    gauges if they are started for this run."""
     from rds.bus.modules.server_process import end_server, start_server
 
     trace = None
@@ -163,6 +165,8 @@ def _bus(
         stack.callback(end_server, server)
     elif drift:
         raise InputError("drift is of modules that the run starts itself; give it to `rds machine serve`")
+    if interface == BUILTIN:
+        stack.enter_context(Command(str(channel)))
     known = options if interface == BUILTIN else {**options, "bitrate": bitrate}
     bus = open_bus(interface, channel, None, node="host", **known)
     stack.callback(bus.shutdown)

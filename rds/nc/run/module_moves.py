@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rds.bus.hub.command import Command
 from rds.bus.modules.oacs.codes import Kind, MessageToHost, Select
 from rds.bus.modules.oacs.messages import Decoded
 from rds.bus.modules.oacs.module import OacsModule
@@ -25,7 +26,7 @@ from rds.bus.modules.oacs.module_data import ModuleData, read_modules
 from rds.bus.modules.oacs.pid import Tuning
 from rds.bus.modules.oacs.several import BusPort, Port, Several, VirtualPort
 from rds.bus.tools.link import BUILTIN, open_bus
-from rds.core.errors import InputError
+from rds.core.errors import InputError, MachineError
 from rds.interpolators.motion.segments import AXES, JOINTS, LINE
 from rds.machines import Machine
 from rds.modes import EMULATION, SIMULATION, mode_names
@@ -111,6 +112,8 @@ def run_moves(
     blocks = list(compiled_form(file, machine, setup or Setup(), progress).blocks())
     rows = [row for block in blocks for row in block.segments]
     _require_points(rows, file)
+    if mode != SIMULATION:
+        _require_no_hands(blocks, file)
     modules = read_modules(machine)
     chosen = _tuning(tuning or {})
     notes = ["F is not obeyed: each module moves at the speed of its own controller."]
@@ -137,6 +140,7 @@ def run_moves(
             for data in modules.values():
                 if data.kind != Kind.TOOL:
                     host.tune(data.node, *chosen)
+        require_start(host, modules, {AXES[k]: float(place) for k, place in enumerate(rows[0]["start"])})
         done, began = _Carrier(host, machine, modules, gauges), port.now()
         try:
             number = 0
@@ -159,6 +163,32 @@ def check_mode(mode: str) -> None:
         raise InputError(f"method {METHOD} runs in {' and '.join(MODES)}: a move command has no dry run; not in {mode}")
 
 
+def require_start(host: Several, modules: Mapping[str, ModuleData], start: Mapping[str, float]) -> None:
+    """MachineError, before anything moves, where an axis stands off the place from which the program takes it.
+
+    All axes are asked, not only those that the program moves: a line that sends an axis to where it is thought to be
+    already has no motion for it. Nor is an axis brought there: what the tool would meet on the way nobody knows.
+    """
+    off = []
+    for name, data in modules.items():
+        if data.kind == Kind.TOOL:
+            continue
+        here, there = host.position(data.node) / data.counts_per_unit, start.get(name, 0.0)
+        if abs(here - there) > max(data.accuracy, 1.0 / data.counts_per_unit):
+            off.append((name, data, here, there))
+    if not off:
+        return
+    off.sort(key=lambda found: found[0] != "Z")  # the tool leaves the work first
+    said = ", ".join(f"{name} stands at {here:.4g} {data.unit}" for name, data, here, _ in off)
+    moves = ", then ".join(f"`rds module {data.node} move --to {there:g}`" for _, data, _, there in off)
+    homes = ", ".join(f"`rds module {data.node} home`" for _, data, _, _ in off)
+    begins = ", ".join(f"{name} at {there:g}" for name, _, _, there in off)
+    raise MachineError(
+        f"{said}, and the program begins with {begins}: nothing has moved; take the axes there, Z first, in the Jog "
+        f"panel or by {moves}, with --channel of their bus (where the zero is lost, {homes} before)"
+    )
+
+
 class _Carrier:
     """Carries lines out, one after the other, and keeps what came of them."""
 
@@ -170,13 +200,11 @@ class _Carrier:
         host.listen = self._listen
         self._axes = {AXES.index(name): name for name in machine.axes if name in AXES}
         self._tool = next((data.node for data in modules.values() if data.kind == Kind.TOOL), None)
-        self._at_start: set[int] = set()
         self.moves: list[AxisMove] = []
 
     def carry_out(self, row: np.void | None, events: Sequence[Event]) -> None:
         """The motion of a segment, if there is one, then what happens after it."""
         if row is not None:
-            self._begin(row)
             self._move(row)
         for event in events:
             if event.kind == "dwell":
@@ -192,21 +220,6 @@ class _Carrier:
             if data is not None:
                 place = fields["Position"] / data.counts_per_unit
                 self.told.setdefault(data.name, []).append((at - self._began, place))
-
-    def _begin(self, row: np.void) -> None:
-        """An axis that the program moves for the first time goes to where it takes it from, if it stands elsewhere."""
-        away = {}
-        for k in np.flatnonzero(row["start"] != row["end"]):
-            data = self._modules[self._axes[int(k)]]
-            if data.node in self._at_start:
-                continue
-            self._at_start.add(data.node)
-            here = self._host.position(data.node) / data.counts_per_unit
-            if abs(here - row["start"][k]) > max(data.accuracy, 1.0 / data.counts_per_unit):
-                away[data.node] = float(row["start"][k]), data, abs(here - row["start"][k])
-        if away:
-            patience = max(_patience(data, way) for _, data, way in away.values())
-            self._host.to({node: target for node, (target, _, _) in away.items()}, patience)
 
     def _move(self, row: np.void) -> None:
         moved = {self._axes[int(k)]: int(k) for k in np.flatnonzero(row["start"] != row["end"])}
@@ -252,6 +265,27 @@ def _require_points(rows: Sequence[np.void], file: Path) -> None:
         raise InputError("nothing in it moves: there is nothing to run", str(file))
 
 
+def _require_no_hands(blocks: Sequence[PathBlock], file: Path) -> None:
+    """InputError for a program that stops for somebody's hands, which a run that does not stop would meet."""
+    stopped = None
+    for row, events in _in_order(blocks):
+        if stopped is not None and row is not None and (row["start"] != row["end"]).any():
+            raise InputError(
+                f"line {stopped} waits for somebody (M0, M1) and line {row['line']} moves on, but move commands do not "
+                "wait: end the program at the stop and make the rest another one, or leave --method out",
+                str(file),
+            )
+        for event in events:
+            if event.kind == "tool":
+                raise InputError(
+                    f"line {event.line} changes the tool (M6), and move commands do not wait for it: make a program "
+                    "for each tool, without M6, or leave --method out",
+                    str(file),
+                )
+            if event.kind == "stop":
+                stopped = event.line
+
+
 def _virtual(machine: Machine, modules: Mapping[str, ModuleData]) -> dict[str, OacsModule]:
     return {
         axis.name: OacsModule(axis, modules[axis.name], slot, machine.sample_period, 0.0, slot, machine.converter.range)
@@ -265,12 +299,17 @@ def _starts_modules(channel: str | None, interface: str) -> bool:
 
 
 def _bus(machine: Machine, channel: str | None, interface: str, bitrate: int, stack: ExitStack) -> BusPort:
-    """A bus with the modules on it; they are started for this run where no channel and no other bus is said."""
+    """A bus with the modules on it, and the command of it, as long as `stack` is open.
+
+    The modules are started for this run where no channel and no other bus is said.
+    """
     from rds.bus.modules.server_process import end_server, start_server
 
     if _starts_modules(channel, interface):
         channel = f"{machine.name[:20]}-{secrets.token_hex(4)}"
         stack.callback(end_server, start_server("oacs", machine.path, channel))
+    if interface == BUILTIN:
+        stack.enter_context(Command(str(channel)))
     bus = open_bus(interface, channel, None, node="host", **({} if interface == BUILTIN else {"bitrate": bitrate}))
     stack.callback(bus.shutdown)
     return BusPort(bus)

@@ -25,6 +25,7 @@ from rds.bus.modules.oacs.refusals import reason
 from rds.core.errors import MachineError
 
 _KEEP_ALIVE = 0.5  # s; modules end a motion when they hear nothing for 2 s
+_RUNDOWN = 60.0  # s that a tool may take to come to rest
 _LEAST_STEP = 1e-6  # s, by which virtual time goes on at least
 
 
@@ -145,11 +146,15 @@ class Several:
         return found
 
     def turn(self, number: int, speed: float) -> None:
-        """Turn a tool at `speed` (rev/min, + clockwise) from now on; 0 stops it."""
+        """Turn a tool at `speed` (rev/min, + clockwise) from now on; 0 stops it. First it comes to rest."""
         if number in self._turning:
             self._turning.discard(number)
             self._command(number, "to stop", Acknowledges.STOP, {"Code": Code.MOVE, "Move": Move.STOP})
-            self._answer({number}, Acknowledges.START, self.port.now() + 60.0)  # the end of its turning, at rest
+            with self._stopping():
+                _, result, _ = self._answer({number}, Acknowledges.START, self.port.now() + _RUNDOWN)
+                if result is None:
+                    self._fail(number, f"was told to stop and did not say within {_RUNDOWN:g} s that it is at rest; it "
+                               "may still turn: see to its power and cable")  # fmt: skip
         if speed:
             thousandths, direction = round(abs(speed) * THOUSAND), int(speed > 0)
             fields = {"Code": Code.MOVE, "Move": Move.START, "Direction": direction, "Argument": thousandths}
@@ -164,10 +169,16 @@ class Several:
                 pass
 
     def stop(self) -> None:
-        """Zero volts on all of them, now, whatever they do."""
+        """Zero volts on all of them, now, whatever they do. It raises after all have been told, if one could not be."""
+        failed = None
         for number in self._names:
-            self._send(number, Code=Code.MOVE, Move=Move.STOP)
+            try:
+                self._send(number, Code=Code.MOVE, Move=Move.STOP)
+            except BaseException as error:  # a second Ctrl-C, too, comes after the last has been told
+                failed = failed or error
         self._turning.clear()
+        if failed is not None:
+            raise failed
 
     # --- parts
 
