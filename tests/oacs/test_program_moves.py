@@ -250,6 +250,30 @@ def test_a_module_that_is_not_there_is_named_and_all_stop() -> None:
     assert bench.modules["X"].plant.voltage == 0.0 and bench.modules["X"].plant.true_position < 2.0
 
 
+def test_a_module_that_is_lost_in_the_middle_is_named_within_seconds_and_the_others_stop() -> None:
+    """Whether it moves or not: a long way would be waited for otherwise, and a plug may be out."""
+    for lost in ("X", "Z"):
+        bench = Bench()
+
+        class Unplugged(VirtualPort):
+            """Its module `node` is cut off 3 s after the beginning."""
+
+            node = DATA[lost].node
+
+            def hear(self, until: float) -> Decoded | None:
+                while (said := super().hear(until)) is not None and self.now() > 3.0:
+                    if self.node not in (said.node, said.fields.get("BoardID")):
+                        break
+                return said
+
+        host = Several(Unplugged(list(bench.modules.values())), {DATA[name].node: name for name in bench.modules})
+        with pytest.raises(MachineError, match=rf"^{lost} has fallen silent: it answered nothing for 2 s; see to"):
+            host.to({DATA["X"].node: 100.0}, 200.0)
+        assert 4.5 < host.port.now() < 6.0
+        host.rest(0.5)
+        assert bench.modules["X"].plant.voltage == 0.0
+
+
 def test_a_tool_that_stops_by_itself_ends_the_motion() -> None:
     bench = Bench()
     bench.host.turn(DATA["drill"].node, 300.0)

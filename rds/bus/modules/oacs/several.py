@@ -25,6 +25,7 @@ from rds.bus.modules.oacs.refusals import reason
 from rds.core.errors import MachineError
 
 _KEEP_ALIVE = 0.5  # s; modules end a motion when they hear nothing for 2 s
+_UNANSWERED = 4  # questions in a row, so 2 s, after which a module is taken for lost
 _RUNDOWN = 60.0  # s that a tool may take to come to rest
 _LEAST_STEP = 1e-6  # s, by which virtual time goes on at least
 
@@ -104,6 +105,7 @@ class Several:
         self.listen: Callable[[float, Decoded], None] = lambda at, message: None  # everything they say, and when, s
         self._turning: set[int] = set()  # tools
         self._alive = port.now() + _KEEP_ALIVE
+        self._unanswered = dict.fromkeys(names, 0)  # questions since a module said anything
 
     def tune(self, number: int, controller: Select, tuning: Mapping[str, float]) -> None:
         """Set a module's controller and parameters of it, all at once; those not given stay as they are."""
@@ -208,14 +210,14 @@ class Several:
         return 0, None, 0
 
     def _hear(self, until: float) -> Decoded | None:
-        """The next message until then. Meanwhile the modules hear that the host lives, and tools have to turn."""
+        """The next message until then. Meanwhile each module is asked whether it lives, hears so that the host does,
+        and tools have to turn."""
         while True:
             if self.port.now() >= self._alive:
-                self._alive = self.port.now() + _KEEP_ALIVE
-                for number in self._names:
-                    self._send(number, Code=Code.READ_PARAMETER, ReadIndex=Parameter.SELECT)
+                self._ask_all()
             message = self.port.hear(min(until, self._alive))
             if message is not None:
+                self._unanswered[message.fields["BoardID"] if message.kind == "Reply" else message.node] = 0
                 self.listen(self.port.now(), message)
                 ended = self._turning and acknowledgement(Acknowledges.START, last=True)(message)
                 if ended and (number := message.fields["BoardID"]) in self._turning:
@@ -224,6 +226,16 @@ class Several:
                 return message
             if self.port.now() >= until:
                 return None
+
+    def _ask_all(self) -> None:
+        """MachineError naming a module that has answered none of the last questions."""
+        self._alive = self.port.now() + _KEEP_ALIVE
+        for number in self._names:
+            if self._unanswered[number] >= _UNANSWERED:
+                self._fail(number, f"has fallen silent: it answered nothing for {_UNANSWERED * _KEEP_ALIVE:g} s; see "
+                           "to its power and cable (`rds scan` shows who is there)")  # fmt: skip
+            self._unanswered[number] += 1
+            self._send(number, Code=Code.READ_PARAMETER, ReadIndex=Parameter.SELECT)
 
     def _fail(self, number: int, said: str) -> NoReturn:
         raise MachineError(f"{self._names[number]} {said}")
