@@ -78,13 +78,6 @@ def test_the_last_sample_counts_as_the_others_do() -> None:
     assert len(result) == 1 and result.meta["ending"] == "following error"
 
 
-def test_the_repetition_of_a_run_that_it_ended_goes_through_all_its_samples(tmp_path: Path) -> None:
-    """The second look at a late run hands the laws no voltages."""
-    experiment = rds.Experiment(controller="p", reference=SINE, following_error={"ferror": 0.01}, duration=1.0)
-    assert all(axis.following_error is None for axis in experiment.plan().unwatched().axes)
-    assert any(axis.following_error is not None for axis in experiment.plan().axes)
-
-
 def test_a_part_program_ends_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("part.ngc").write_text("G21 G90\nG1 X5 F600\nM2\n")
