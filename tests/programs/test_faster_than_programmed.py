@@ -15,7 +15,7 @@ from rds.interpolators.acceleration import make_acceleration
 from rds.interpolators.interpolator import library_interpolator
 from rds.machines import load_machine
 from rds.modes.loop.interpolated import Interpolated
-from rds.nc.run.path import Method, program_of
+from rds.nc.run.path_method import Method, program_of
 
 CIRCLE = [{"kind": "arc", "end": [0.0, 0.0], "centre": [5.0, 0.0]}]
 CORNER = [{"kind": "line", "end": [10.0, 0.0]}, {"kind": "line", "end": [10.0, 10.0]}]

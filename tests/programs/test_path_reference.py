@@ -24,7 +24,8 @@ from rds.modes.loop.interpolated import Interpolated
 from rds.modes.loop.program import InterpolatedProgram
 from rds.nc.run.judge import located
 from rds.nc.run.methods import compare_methods
-from rds.nc.run.path import Method, as_prepared, program_of
+from rds.nc.run.path import as_prepared
+from rds.nc.run.path_method import Method, program_of
 from rds.nc.run.pictures import along, path
 from rds.nc.run.report import findings
 from rds.nc.run.run import PartProgram

@@ -86,6 +86,8 @@ def test_accuracy_needs_no_options_for_them() -> None:
 
 
 def test_a_table_that_is_none_is_refused_with_those_there_are() -> None:
-    with pytest.raises(InputError, match=r"oacs:Q44 is no table .* there are oacs:M28, .*oacs:Q43; did you mean 'Q4"):
+    with pytest.raises(
+        InputError, match=r"oacs:Q44 is no table .* there are oacs:M28, .*oacs:Q43; did you mean 'oacs:Q4"
+    ):
         make_report("current", ["oacs:Q44"])
     assert all(data_file(f"oacs:{table}").is_file() for table in TITLES)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from rds.bus.analysis.messages import Message, in_order, messages_of
 from rds.bus.analysis.response_times import NS, Errors, Response, responses
@@ -17,6 +17,22 @@ from rds.machines.machine import Machine
 
 MET, MISSED, UNBOUNDED = "met", "missed", "unbounded"
 HIGHEST_BITRATE, HIGHEST_DATA_BITRATE = 1_000_000, 8_000_000  # bit/s: ISO 11898-1, and CAN FD transceivers
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+_R = TypeVar("_R", bound=_Named)
+
+
+def row_called(name: str, rows: Sequence[_R]) -> _R:
+    """The row of the message called `name`; InputError names those there are."""
+    for row in rows:
+        if row.name == name:
+            return row
+    raise InputError(f"no message {name!r}; there are {', '.join(row.name for row in rows)}")
 
 
 class Row(NamedTuple):
@@ -72,10 +88,7 @@ class Analysis:
 
     def row(self, name: str) -> Row:
         """The row of the message called `name`; InputError names those there are."""
-        for row in self.rows:
-            if row.name == name:
-                return row
-        raise InputError(f"no message {name!r}; there are {', '.join(row.name for row in self.rows)}")
+        return row_called(name, self.rows)
 
     def to_json(self) -> dict[str, Any]:
         """The analysis as plain values for json.dumps: times in µs, null for what is unbounded."""

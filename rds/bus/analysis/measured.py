@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rds.bus.analysis.analysis_report import Analysis, Row
+from rds.bus.analysis.analysis_report import Analysis, Row, row_called
 from rds.bus.analysis.cycles import Paired, from_grid, from_releaser
 from rds.bus.analysis.measured_words import (
     ABSENT,
@@ -115,10 +115,7 @@ class Measured:
 
     def row(self, name: str) -> Delays:
         """The row of the message called `name`; InputError names those there are."""
-        for row in self.rows:
-            if row.name == name:
-                return row
-        raise InputError(f"no message {name!r}; there are {', '.join(row.name for row in self.rows)}")
+        return row_called(name, self.rows)
 
     def to_json(self) -> dict[str, Any]:
         """Plain values for json.dumps: times in µs but for those of the log, in s."""

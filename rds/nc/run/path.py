@@ -6,16 +6,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import ceil
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.geometry import length
 from rds.core.last_made import LastMade
 from rds.core.load import StudentFile, from_function
 from rds.core.quantities import AnyValue, Choice, Flag, Items, Quantity, Table, Text
@@ -23,27 +21,26 @@ from rds.core.toml_table import TomlTable
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.interpolators import DEFAULT, LIBRARY
 from rds.interpolators.acceleration import LIBRARY as FILTERS
-from rds.interpolators.acceleration import Acceleration, make_acceleration, smooth_one_by_one
+from rds.interpolators.acceleration import Acceleration, make_acceleration
 from rds.interpolators.interpolator import Interpolator, find_interpolator, from_student
-from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.profiles import BLENDED, PROFILES
 from rds.interpolators.motion.segments import AXES, BLEND, EXACT_STOP
 from rds.interpolators.path import check_chain
 from rds.interpolators.segment_rows import SEGMENTS, read_segments, segments_of
 from rds.machines import Machine
 from rds.modes.loop.interpolated import LEAST_AHEAD
-from rds.modes.loop.program import InterpolatedProgram, Program, ProgramEvent, Row, Stretch, dwell_samples
+from rds.modes.loop.program import InterpolatedProgram, Program, ProgramEvent
 from rds.nc.check import motion
 from rds.nc.interpolator_segments import program as moves_of
 from rds.nc.path_block import PathBlock
 from rds.nc.run.judge import judged
+from rds.nc.run.path_method import MOST_SAMPLES, Method, program_of
 from rds.nc.run.path_segments import check_room, in_machine_axes, without_idle
 from rds.nc.run.prepare import Prepared, planned, prepare
 from rds.nc.setup import Setup
 from rds.results import Result
 
 SUFFIX = ".toml"  # of a path file; any other is a part program
-MOST_SAMPLES = 20_000_000
 _MOST_AHEAD = 100_000
 _OF_AN_INTERPOLATOR = ("interpolator", "arc_interpolator", "params", "acceleration", "exact_stop", "look_ahead")
 
@@ -85,25 +82,6 @@ WORDS = Table(
         ),
     },
 )
-
-
-@dataclass(frozen=True)
-class Method:
-    """What makes the samples of a path: an interpolator, a filter on top of it, and how many rows ahead it works.
-
-    `arcs` is another interpolator for the arcs, if there is one.
-    """
-
-    interpolator: Interpolator
-    acceleration: Acceleration | None = None
-    exact_stop: bool = False
-    ahead: int = LEAST_AHEAD
-    arcs: Interpolator | None = None
-
-    @property
-    def interpolators(self) -> tuple[Interpolator, ...]:
-        """That of lines, and that of arcs where it is another one."""
-        return (self.interpolator,) if self.arcs is None else (self.interpolator, self.arcs)
 
 
 def program(
@@ -292,93 +270,6 @@ def _inline(words: TomlTable) -> list[Segment]:
             raise InputError(f"{key} of the path is missing; it needs start, feed and segment", words.place())
     rows = [dict(table.table) for table in words.tables("segment")]
     return segments_of(words.read("start"), rows, words.read("feed"), words.read("feed_unit"))
-
-
-def program_of(
-    name: str,
-    segments: Sequence[Segment],
-    lines: Sequence[int],
-    due: Mapping[int, tuple[ProgramEvent, ...]],
-    first: tuple[ProgramEvent, ...],
-    method: Method,
-    machine: Machine,
-    axes: Sequence[str],
-    T: float,
-    spindle: bool = False,
-) -> InterpolatedProgram:
-    """The program of these segments; `due` says after which of them the axes rest, and what happens there."""
-    check_chain(segments, T)
-    check_room(segments, lines, machine, axes)
-    weights = method.acceleration.weights(T) if method.acceleration else np.ones(1)
-    lines_by, arcs_by = method.interpolator, method.arcs or method.interpolator
-    ends = set(due) | (set(range(len(segments))) if method.exact_stop else set()) | {len(segments) - 1}
-    stretches, begin, samples = [], 0, 1
-    for end in sorted(ends):
-        part = tuple(segments[begin : end + 1])
-        happens = tuple(due.get(end, ()))
-        stretches.append(Stretch(_Rows(part, begin, lines_by, arcs_by, weights, T), happens))
-        samples += sum(ceil(length(each) / each.feed_rate / T - 1e-9) for each in part) + len(weights) - 1
-        samples += sum(dwell_samples(each.value, T) for each in happens if each.kind == "dwell")
-        begin = end + 1
-    if samples > MOST_SAMPLES:
-        raise InputError(f"the path takes {samples} samples of {T:g} s; a run takes at most {MOST_SAMPLES}", name)
-    limits = Limits.of(machine)
-    order = [AXES.index(each) for each in axes]
-    turning = next((each.name for each in machine.axes.values() if each.unit == "rev/min"), None) if spindle else None
-    filter_ = method.acceleration
-    return InterpolatedProgram(
-        axes=tuple(axes),
-        spindle=turning,
-        start=tuple(float(value) for value in segments[0].start),
-        first=first,
-        stretches=tuple(stretches),
-        line=tuple(lines),
-        feed=max(each.feed_rate for each in segments),
-        ahead=method.ahead,
-        samples=samples,
-        home=(0.0,) * len(axes),
-        limits=np.array([limits.velocity, limits.acceleration, limits.jerk])[:, order],
-        travel=np.array([machine.axes[each].travel for each in axes], dtype=float),
-        path=in_machine_axes(segments, lines, order),
-        about={
-            "interpolator": ", arcs by ".join(each.name for each in method.interpolators),
-            "interpolator_params": dict(method.interpolator.params),
-            **({} if method.arcs is None else {"arc_interpolator_params": dict(method.arcs.params)}),
-            "acceleration": None if filter_ is None else {"name": filter_.name, **filter_.params},
-            "exact_stop": method.exact_stop,
-            "look_ahead": method.ahead,
-        },
-        name=name,
-    )
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Makes the rows of segments that are passed without a rest. `first` is the number of the first segment."""
-
-    segments: tuple[Segment, ...]
-    first: int
-    lines: Interpolator
-    arcs: Interpolator
-    weights: np.ndarray
-    T: float
-
-    def __call__(self) -> Iterator[Row]:
-        number = self.first - 1
-        blu = next((each.blu for each in (self.lines, self.arcs) if each.blu is not None), None)
-
-        def made() -> Iterator[np.ndarray]:
-            nonlocal number
-            for segment in self.segments:
-                number += 1
-                yield from (self.arcs if isinstance(segment, ArcSegment) else self.lines).each(segment, self.T)
-
-        rows: Iterable[Sequence[np.ndarray]] = made()  # type: ignore[assignment]
-        if len(self.weights) > 1:
-            rows = smooth_one_by_one(rows, self.segments[0].start, self.weights, self.T)
-        for position, velocity, acceleration in rows:
-            at = position if blu is None else np.rint(position / blu) * blu
-            yield at.tolist(), velocity.tolist(), acceleration.tolist(), number
 
 
 def judged_path(result: Result, made: InterpolatedProgram | Program, T: float) -> Result:

@@ -37,6 +37,8 @@ def data_file(name: str | Path) -> Path:
         return Path(name)
     table = text.removeprefix(PREFIX)
     if table not in TITLES:
-        known = ", ".join(f"{PREFIX}{each}" for each in TITLES)
-        raise InputError(f"{text} is no table of the thesis's readings; there are {known}{near(table, list(TITLES))}")
+        known = [f"{PREFIX}{each}" for each in TITLES]
+        raise InputError(
+            f"{text} is no table of the thesis's readings; there are {', '.join(known)}{near(text, known)}"
+        )
     return Path(str(files(__name__))) / f"{table}.csv"
