@@ -34,6 +34,8 @@ def test_it_is_fitted_as_any_log() -> None:
     ("more", "units", "said"),
     [
         ({}, {"command": "V"}, "units has no 'position'"),
+        ({}, UNITS | {"current": "A"}, "units has 'current', which the data have not"),
+        ({"u": ["one", "two"]}, UNITS, "u and y must be arrays of numbers"),
         ({"u": np.zeros((3000, 2))}, UNITS, r"u has shape \(3000, 2\)"),
         ({"sampling_time": 0.0}, UNITS, "sampling_time = 0.0 must be more than 0 s"),
         ({"y": np.zeros(10)}, UNITS, "position has shape"),

@@ -103,9 +103,15 @@ class Log:
         """
         if missing := [each for each in ("u", "y", "sampling_time") if not hasattr(data, each)]:
             raise InputError(f"{data!r:.60} has no {missing[0]}; data have u, y and sampling_time")
+        both = 'give both, as in {"command": "V", "position": "mm"}'
         if missing := [each for each in ("command", "position") if each not in units]:
-            raise InputError(f'units has no {missing[0]!r}; give both, as in {{"command": "V", "position": "mm"}}')
-        u, y = (np.squeeze(np.asarray(values, dtype=float)) for values in (data.u, data.y))
+            raise InputError(f"units has no {missing[0]!r}; {both}")
+        if strange := [each for each in units if each not in ("command", "position")]:
+            raise InputError(f"units has {strange[0]!r}, which the data have not; {both}")
+        try:
+            u, y = (np.squeeze(np.asarray(values, dtype=float)) for values in (data.u, data.y))
+        except (ValueError, TypeError) as error:
+            raise InputError(f"u and y must be arrays of numbers: {error}") from error
         if u.ndim != 1 or y.ndim != 1:
             raise InputError(f"u has shape {np.shape(data.u)} and y {np.shape(data.y)}; a log has one of each")
         step = Quantity("sampling time", "s", above=0.0).check(data.sampling_time, "sampling_time")
