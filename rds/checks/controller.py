@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rds.checks import clauses
+from rds.checks.allowance import Allowance
 from rds.checks.answers import voltage_fault
 from rds.checks.checked_code import CheckedCode, checked_code
 from rds.checks.exercise import LinearAxis, references
@@ -26,7 +27,7 @@ from rds.core.signature import argument_fault
 from rds.core.types import Controller, Reference
 from rds.core.values import shown
 
-BUDGET = 2.0  # s for each pass over the run: a slow controller is judged by fewer samples
+BUDGET = 2.0  # s of its own for each pass over the run: a slow controller is judged by fewer samples
 _LEAST = 5  # samples, whatever they take
 _LARGE_ERROR = 100.0  # mm
 _SEVERAL = "it works with arrays of several axes: check it with `rds check --axes`, run it with `coupled = true`"
@@ -106,41 +107,46 @@ class _Run:
         state = copy.deepcopy(self.initial_state)
         table = references(self.T)
         plants = [LinearAxis(self.T) for _ in range(max(1, self.axes))]
-        end = time.monotonic() + self.budget
-        for k in range(len(table)):
-            if k >= _LEAST and time.monotonic() > end:
-                break
-            t = k * self.T
-            r, y = self._inputs(table, k, plants)
-            try:
-                before = copy.deepcopy((t, r, y, state))
-            except Exception as error:
-                said = (
-                    f"next_state {shown(state)} cannot be copied ({error}); keep numbers, lists, dicts and arrays in it"
-                )
-                return self.found.fault(clauses.SAVED_STATE, said)
-            self.work.begin()
-            started = time.perf_counter_ns()
-            try:
-                answer = self.function(t, r, y, state, params)
-            except STUDENT_ERRORS as error:
-                return self._failed(error, t, before)
-            self.ns.append(time.perf_counter_ns() - started)
-            self.work.end()
-            if not self._judge_arguments(before, (t, r, y, state), params) or not self._judge_answer(answer, t):
-                return None
-            voltage, state, *told = answer
-            try:
-                self.calls.append(Call(before, copy.deepcopy((voltage, state, *told))))
-            except Exception as error:
-                said = (
-                    f"next_state {shown(state)} cannot be copied ({error}); keep numbers, lists, dicts and arrays in it"
-                )
-                return self.found.fault(clauses.SAVED_STATE, said)
-            self.sizes.append(size(state))
-            for plant, u in zip(plants, np.atleast_1d(np.asarray(voltage, dtype=float)), strict=True):
-                plant.move(t, float(u))
+        with Allowance(self.budget) as allowance:
+            for k in range(len(table)):
+                if k >= _LEAST and allowance.is_spent():
+                    return self.found.tried(k, len(table), self.budget)
+                t = k * self.T
+                r, y = self._inputs(table, k, plants)
+                answer = self._call(t, r, y, state, params)
+                if answer is None:
+                    return None
+                voltage, state, *_ = answer
+                self.sizes.append(size(state))
+                for plant, u in zip(plants, np.atleast_1d(np.asarray(voltage, dtype=float)), strict=True):
+                    plant.move(t, float(u))
         return None
+
+    def _call(self, t: float, r: Reference, y: Any, state: Any, params: dict[str, Any]) -> Any:
+        """Its answer, which is kept with what it was given; None after a fault."""
+        try:
+            before = copy.deepcopy((t, r, y, state))
+        except Exception as error:
+            return self._cannot_be_copied(state, error)
+        self.work.begin()
+        started = time.perf_counter_ns()
+        try:
+            answer = self.function(t, r, y, state, params)
+        except STUDENT_ERRORS as error:
+            return self._failed(error, t, before)
+        self.ns.append(time.perf_counter_ns() - started)
+        self.work.end()
+        if not self._judge_arguments(before, (t, r, y, state), params) or not self._judge_answer(answer, t):
+            return None
+        try:
+            self.calls.append(Call(before, copy.deepcopy(tuple(answer))))
+        except Exception as error:
+            return self._cannot_be_copied(answer[1], error)
+        return answer
+
+    def _cannot_be_copied(self, state: Any, error: Exception) -> None:
+        said = f"next_state {shown(state)} cannot be copied ({error}); keep numbers, lists, dicts and arrays in it"
+        self.found.fault(clauses.SAVED_STATE, said)
 
     def _inputs(self, table: np.ndarray, k: int, plants: list[LinearAxis]) -> tuple[Reference, Any]:
         if not self.axes:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rds.checks import clauses
+from rds.checks.allowance import Allowance
 from rds.checks.checked_code import CheckedCode, checked_code
 from rds.checks.memory import judge_memory
 from rds.checks.replay import Call
@@ -149,23 +150,25 @@ class _Check:
     def _drive(self) -> None:
         """Follow the response to a voltage, and keep every call."""
         x, params = self.x0.copy(), copy.deepcopy(self.params)
-        end = time.monotonic() + self.budget
-        for k, u in enumerate(_voltages(self.T)):
-            if k >= _LEAST and time.monotonic() > end:
-                break
-            if self.output is not None and not self._judge_output(k * self.T, x, u):
-                return
-            self.positions.append(float(x[0]))
-            after = self._step(k, x, u, params)
-            if after is None:
-                return
-            x = after
-            if np.abs(x).max() > _RUNAWAY or not np.isfinite(x).all():
-                said = f"a state grows beyond {_RUNAWAY:g} within {k} samples at {u:g} V"
-                self.found.warn(
-                    clauses.FINITE, f"{said}; it is unstable, or too fast for {SUBSTEPS} RK4 steps a sample"
-                )
-                return
+        voltages = _voltages(self.T)
+        with Allowance(self.budget) as allowance:
+            for k, u in enumerate(voltages):
+                if k >= _LEAST and allowance.is_spent():
+                    return self.found.tried(k, len(voltages), self.budget)
+                if self.output is not None and not self._judge_output(k * self.T, x, u):
+                    return None
+                self.positions.append(float(x[0]))
+                after = self._step(k, x, u, params)
+                if after is None:
+                    return None
+                x = after
+                if np.abs(x).max() > _RUNAWAY or not np.isfinite(x).all():
+                    said = f"a state grows beyond {_RUNAWAY:g} within {k} samples at {u:g} V"
+                    self.found.warn(
+                        clauses.FINITE, f"{said}; it is unstable, or too fast for {SUBSTEPS} RK4 steps a sample"
+                    )
+                    return None
+        return None
 
     def _step(self, k: int, x: np.ndarray, u: float, params: dict[str, Any]) -> np.ndarray | None:
         """The state one sample later; None after a fault."""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from rds.checks.allowance import Allowance
 from rds.checks.values import same
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.types import Source
@@ -46,30 +47,32 @@ class Replay:
         With `chained`, a controller begins with `state` and goes on with the states that it returns itself: in a
         fresh copy, objects of the student's classes are not those of the first copy.
         """
-        when, end = "when the run was repeated in a fresh copy", time.monotonic() + self.budget
-        for k, call in enumerate(self.calls):
-            if k >= _LEAST and time.monotonic() > end:
-                break
-            arguments = copy.deepcopy((*call.arguments[:3], state) if chained else call.arguments)
-            answer = self._again(k, arguments, when)
-            if isinstance(answer, Difference):
-                return answer
-            if chained:
-                state = answer[1]
+        when = "when the run was repeated in a fresh copy"
+        with Allowance(self.budget) as allowance:
+            for k, call in enumerate(self.calls):
+                if k >= _LEAST and allowance.is_spent():
+                    break
+                arguments = copy.deepcopy((*call.arguments[:3], state) if chained else call.arguments)
+                answer = self._again(k, arguments, when)
+                if isinstance(answer, Difference):
+                    return answer
+                if chained:
+                    state = answer[1]
         return None
 
     def out_of_order(self) -> Difference | None:
         """The calls in a fixed random order, each twice in a row, as when two axes use the same function."""
         order = list(range(len(self.calls)))
         random.Random(1).shuffle(order)
-        when, end = "when other calls came before it", time.monotonic() + self.budget
-        for done, k in enumerate(order):
-            if done >= _LEAST and time.monotonic() > end:
-                break
-            for _ in range(2):
-                answer = self._again(k, copy.deepcopy(self.calls[k].arguments), when)
-                if isinstance(answer, Difference):
-                    return answer
+        when = "when other calls came before it"
+        with Allowance(self.budget) as allowance:
+            for done, k in enumerate(order):
+                if done >= _LEAST and allowance.is_spent():
+                    break
+                for _ in range(2):
+                    answer = self._again(k, copy.deepcopy(self.calls[k].arguments), when)
+                    if isinstance(answer, Difference):
+                        return answer
         return None
 
     def _again(self, k: int, arguments: tuple[Any, ...], when: str) -> Any:

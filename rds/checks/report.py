@@ -135,6 +135,10 @@ class Findings:
         """Note something that keeps the letter of a clause and will hurt all the same."""
         _add(self.warnings, clause, message)
 
+    def tried(self, samples: int, of: int, seconds: float) -> None:
+        """Note that a run ended before its end, because it had taken its time."""
+        self.notes.append(f"only the first {samples} of {of} samples were tried: they took {seconds:g} s")
+
     def report(self, interface: str, name: str, timing: Timing | None = None) -> CheckReport:
         """All of it."""
         return CheckReport(interface, name, tuple(self.faults), tuple(self.warnings), timing, tuple(self.notes))

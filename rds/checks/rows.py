@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.checks import clauses
+from rds.checks.allowance import Allowance
 from rds.checks.paths import name_of
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import RdsError
@@ -45,32 +46,32 @@ def trace(
     taken: list[np.ndarray] = []
     result = Trace(segment, np.empty((0, 3, len(segment.start))))
     most = _ROWS_PER_ROW * int(length(segment) / segment.feed_rate / T) + _SPARE_ROWS
-    end = time.monotonic() + budget
     try:
-        rows = iterate(interpolate(segment, T, params))
-        if isinstance(rows, str):
-            result.fault = (clauses.ROWS, f"for {name_of(segment)} interpolate() returned {rows}")
-            return result
-        while True:
-            started = time.perf_counter_ns()
-            try:
-                row = next(rows)
-            except StopIteration:
-                break
-            result.ns.append(time.perf_counter_ns() - started)
-            values = row_of(row, len(segment.start))
-            if isinstance(values, tuple):
-                result.fault = (values[0], f"row {len(taken)} of {name_of(segment)} is {shown(row)}; {values[1]}")
-                break
-            taken.append(values)
-            if len(taken) > most:
-                said = f"{name_of(segment)} of {length(segment):.1f} mm at {segment.feed_rate:g} mm/s has no end"
-                remedy = "end the loop at the segment's end"
-                result.fault = (clauses.ENDS, f"{said} after {len(taken)} rows of {T:g} s; {remedy}")
-                break
-            if time.monotonic() > end:
-                result.complete = False
-                break
+        with Allowance(budget) as allowance:
+            rows = iterate(interpolate(segment, T, params))
+            if isinstance(rows, str):
+                result.fault = (clauses.ROWS, f"for {name_of(segment)} interpolate() returned {rows}")
+                return result
+            while True:
+                started = time.perf_counter_ns()
+                try:
+                    row = next(rows)
+                except StopIteration:
+                    break
+                result.ns.append(time.perf_counter_ns() - started)
+                values = row_of(row, len(segment.start))
+                if isinstance(values, tuple):
+                    result.fault = (values[0], f"row {len(taken)} of {name_of(segment)} is {shown(row)}; {values[1]}")
+                    break
+                taken.append(values)
+                if len(taken) > most:
+                    said = f"{name_of(segment)} of {length(segment):.1f} mm at {segment.feed_rate:g} mm/s has no end"
+                    remedy = "end the loop at the segment's end"
+                    result.fault = (clauses.ENDS, f"{said} after {len(taken)} rows of {T:g} s; {remedy}")
+                    break
+                if allowance.is_spent():
+                    result.complete = False
+                    break
     except STUDENT_ERRORS as error:
         said = student_error(error, source)
         result.fault = (clauses.RUNS, f"interpolate() failed for {name_of(segment)}: {said}")

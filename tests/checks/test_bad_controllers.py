@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import os
 import random
+import re
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -279,20 +281,45 @@ def test_the_broken_clause_is_named(bad, clause, detail):
     assert detail in str(report)
 
 
-@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no thread is bound to a processor here")
-def test_a_slow_law_that_others_keep_from_the_processor_is_not_told_that_it_waits():
+@pytest.fixture
+def crowded() -> Iterator[None]:
+    """Eight others work on the one processor that this process may use."""
+    if not hasattr(os, "sched_setaffinity"):
+        pytest.skip("no thread is bound to a processor here")
     processors = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(processors)})  # which those that are started inherit
     work = "import time\nwhile time.process_time() < 60: pass"  # an end of its own, should this test be killed
     others = [subprocess.Popen([sys.executable, "-c", work]) for _ in range(8)]
-    try:
-        report = check_controller(slow, initial_state=[0.0], budget=0.5)
-    finally:
-        for other in others:
-            other.kill()
-            other.wait()
-        os.sched_setaffinity(0, processors)
-    assert "compute less" in str(report)
+    yield
+    for other in others:
+        other.kill()
+        other.wait()
+    os.sched_setaffinity(0, processors)
+
+
+def test_a_slow_law_that_others_keep_from_the_processor_is_not_told_that_it_waits(crowded):
+    assert "compute less" in str(check_controller(slow, initial_state=[0.0], budget=0.1))
+
+
+def test_a_late_fault_is_found_when_others_keep_the_law_from_the_processor(crowded):
+    """A budget by the clock ended the run at sample 330 of 1800, and the law was said to keep its interface."""
+    started = time.process_time()
+    assert check_controller(not_a_number, initial_state=[0.0], budget=60.0).faults
+    needed = time.process_time() - started
+    for _ in range(3):
+        report = check_controller(not_a_number, initial_state=[0.0], budget=2 * needed)
+        assert "nan at t = 0.501 s" in str(report)
+
+
+def test_a_run_that_is_cut_short_is_told():
+    """At 10 ms a law of 2 ms is fast enough, but a fault at sample 501 is not looked for in 0.1 s."""
+
+    def control(t, r, y, state, params):
+        time.sleep(0.002)
+        return not_a_number(t / 10, r, y, state, params)
+
+    report = check_controller(control, 0.01, initial_state=[0.0], budget=0.1)
+    assert report.ok and re.search(r"only the first \d\d of 1800 samples were tried: they took 0.1 s", str(report))
 
 
 def undeclared_signals(t, r, y, state, params):

@@ -168,6 +168,14 @@ def test_a_target_that_was_stopped_is_not_the_codes_fault(recorded: tuple[subpro
     assert "stopped from outside" in hung[1] and target.returncode == -signal.SIGKILL
 
 
+def test_the_time_of_a_hang_counts_discarded_periods(recorded: tuple[subprocess.Popen[bytes], Recorder]) -> None:
+    target, its = recorded
+    for sample in (0, 1, 2, 7):  # four came too late and were discarded
+        its.ring.append([sample])
+    hung = watch(target, its, 0.001)
+    assert hung is not None and "at t = 0.008 s" in hung[1]
+
+
 def test_a_recorder_that_was_held_up_kills_nobody(
     recorded: tuple[subprocess.Popen[bytes], Recorder], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -381,8 +389,8 @@ def test_a_controller_that_hangs_is_killed(experiment: Maker, alone: Path) -> No
 
     started = time.monotonic()
     with pytest.raises(
-        rds.ContractError, match=r"did not return for 5 s at t = 0\.500 s, in test_killed\.py, line \d+, in hang; look"
-    ):
+        rds.ContractError, match=r"did not return for 5 s at t = 0\.(4\d\d|500) s, in test_killed\.py, line \d+, in ha"
+    ):  # on a busy computer the period before may have been discarded
         unless_lost(lambda: experiment(at_once(0.5, hang)).run("implementation", out=alone / "run"))
     assert time.monotonic() - started > 5.0
     assert len(check_readable(alone / "run", "fault", 400)) <= 500

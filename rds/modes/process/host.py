@@ -191,7 +191,7 @@ def _recorded(
     finally:
         ring.close()
         live_values.close()
-        for left in (ring.path, ring.live_values_path):
+        for left in (ring.live_values_path, ring.path):  # a ring left alone is found by `remove_left`
             with contextlib.suppress(OSError):
                 left.unlink()
 

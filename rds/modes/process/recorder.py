@@ -13,6 +13,7 @@ import json
 import os
 import re
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -38,6 +39,7 @@ READY = 2  # heartbeats of the target when its loop begins
 PLAN, REPORT, LOG, TRACE = "plan.pickle", "target.json", "target.log", "target.trace"
 ASK_WHERE = getattr(signal, "SIGUSR1", None)  # the target answers in the file TRACE
 ANSWERS_WITHIN = 1.0  # s
+_SAMPLE = struct.Struct("<d")  # at the head of a row: which sample it is
 
 
 class Recorder:
@@ -46,6 +48,7 @@ class Recorder:
     def __init__(self, directory: Path, ring: Ring):
         self.directory, self.ring = directory, ring
         self.lost = 0  # rows that the ring had overwritten before they were copied
+        self.due = 0  # the sample after the last one that was copied: periods may have been discarded before it
         self._file: RecordFile | None = None
         self._next = 0
         self._live_values = LiveValues.open(ring.live_values_path)
@@ -61,7 +64,9 @@ class Recorder:
         first, rows = self.ring.read(self._next)
         if rows:
             self.lost += self._file.append(first, rows)
-            self._next = first + len(rows) // (8 * len(self.ring.columns))
+            size = 8 * len(self.ring.columns)
+            self._next = first + len(rows) // size
+            self.due = int(_SAMPLE.unpack_from(rows, len(rows) - size)[0]) + 1
         self._drain_changes()
         return self._next
 
@@ -110,14 +115,14 @@ def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) ->
             seen, since = now, time.monotonic()
         elif (took := time.monotonic() - looked) > HELD_UP:
             since += took
-        quiet, rows = time.monotonic() - since, now[0]
+        quiet = time.monotonic() - since
         is_running = recorder.ring.heartbeat >= recorder.ring.about["ready"]
         if quiet > (hang_after if is_running else READY_WITHIN):
             stopped = is_stopped(target.pid)
             where = "" if stopped else _where(recorder.directory, target)
             target.kill()
             target.wait()
-            at = f"at t = {rows * period:.3f} s"
+            at = f"at t = {recorder.due * period:.3f} s"
             if stopped:
                 return Ending.KILLED, (
                     f"the target process was stopped from outside (SIGSTOP, or a debugger) {at}, and did not go on for "
@@ -211,7 +216,7 @@ def main(arguments: list[str]) -> int:
     recorder.close()
     finish(directory, ring, conclude(directory, ring.head, target.returncode, hung))
     ring.close()
-    for path in (ring.path, ring.live_values_path):
+    for path in (ring.live_values_path, ring.path):  # in this order, see `shared.remove_left`
         with contextlib.suppress(OSError):
             path.unlink()
     return 0
