@@ -180,7 +180,8 @@ def test_faults_and_path_are_there_before_the_time_is_planned(tmp_path: Path) ->
         if (each := made.tick()) is not None:
             found.append(each)
         time.sleep(0.002)
-    assert [look.cycle is None for look in found] == [True, False]
+    unplanned = [look.cycle is None for look in found]
+    assert unplanned in ([True, False], [True, False, False]), "planned, it is found once more with what it cuts"
     assert all(look.ok and look.trace.high[0] == 60.0 for look in found)
 
 
