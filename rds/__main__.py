@@ -39,4 +39,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    if not sys.flags.safe_path:
+        del sys.path[0]  # the folder that one works in, where a law may be called control.py: as the command `rds`
     main()

@@ -76,6 +76,29 @@ def test_only_what_an_extra_brings_is_asked_for() -> None:
         raise ModuleNotFoundError(name="my_helpers")
 
 
+def test_a_law_that_hides_a_package_is_named(tmp_path: Path) -> None:
+    """Beside a notebook, or a script, Python finds it first."""
+    (tmp_path / "control.py").write_text("def control(t, r, y, state, params):\n    return 0.0, state\n")
+    (tmp_path / "design.py").write_text(
+        "import rds\nfrom rds.core.extras import needed_for\n"
+        "try:\n    with needed_for('this design'):\n        import control\n"
+        "except rds.InputError as error:\n    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "design.py"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.stdout == (
+        f"{tmp_path / 'control.py'}: this design needs the package control, and this file is found in its place: "
+        "rename it and start Python anew\n"
+    ), done.stderr
+
+
+def test_the_folder_that_one_works_in_hides_no_package_from_the_command(tmp_path: Path) -> None:
+    (tmp_path / "can.py").write_text("raise SystemExit('this is not python-can')\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "rds", "scan", "-c", "nobody"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert "no module answers" in done.stdout + done.stderr
+
+
 def test_each_package_is_in_the_extra_that_messages_name() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert project["name"] == installed.DISTRIBUTION
