@@ -35,7 +35,7 @@ _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
 _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
 _RIGOL = re.compile(
-    r"X,(CH\d,)+Start,Increment,?\s*"
+    r"(X,)?(CH\d,)+Start,Increment,?\s*"
 )  # an oscilloscope's first line; the second has units, start, step
 
 
@@ -55,7 +55,7 @@ class Layout:
     times: tuple[int, ...] = ()  # columns that hold the times of the columns after them
     ragged: bool = False  # channels end one after another, and rows with them
     clocks: frozenset[int] = frozenset()  # which of the dates are times of day alone
-    counted: tuple[float, float] | None = None  # the first column is a number of the sample: time of the first, step
+    counted: tuple[float, float] | None = None  # samples are counted, in a column `time` or by row: time of first, step
     passed: str = ""  # a line above the data that has numbers in it, too
     scaled: tuple[str, ...] = ()  # channels of which nothing tells whether their numbers are scaled
     torn: tuple[str, ...] = ()  # of columns for which the heading and the row of units say different units
@@ -123,8 +123,9 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     numbers = [i for i in range(width) if any(is_number(row[i], point) for row in body[:_FEW])]
     passed = "" if labelled else _passed(lines[:first], mark, point, width, numbers)
     counted = None
-    if _RIGOL.fullmatch(lines[0]) and first > 1:
-        names, units, counted = _of_rigol(lines[0], lines[1], names, units)
+    told = next((n for n, line in enumerate(lines[:first]) if line.strip()), first)
+    if told + 1 < first and _RIGOL.fullmatch(lines[told]):
+        names, units, counted = _of_rigol(lines[told], lines[told + 1], names, units)
     return Layout(
         encoding,
         mark,
@@ -239,26 +240,29 @@ def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal:
 
 
 def _passed(above: Sequence[str], delimiter: str, decimal: str, width: int, numbers: Sequence[int]) -> str:
-    """The last line above the data that has numbers where they have, two or more; "" where none has."""
+    """The last line above the data with numbers where they have, or of numbers alone, two or more; "" for none."""
     for line in reversed(above):
         cells = split(line, delimiter)
         if len(cells) == width and len(numbers) > 1 and all(is_number(cells[i], decimal) for i in numbers):
             return line
+        if are_numbers([cell for cell in cells if cell]):
+            return line  # perhaps the first row, with a constant beside it
     return ""
 
 
 def _of_rigol(
     head: str, below: str, names: tuple[str, ...], units: tuple[str | None, ...]
 ) -> tuple[tuple[str, ...], tuple[str | None, ...], tuple[float, float] | None]:
-    """Names, units, and time of the first sample and step, of a table whose first column counts the samples."""
-    channels = [cell for cell in split(head, ",") if cell.startswith("CH")]
-    _, *own = split(below, ",")
+    """Names, units, and time of the first sample and step, of a table that counts the samples, or has them alone."""
+    cells, own = split(head, ","), split(below, ",")
+    found = cells.index("Start")
     try:
-        counted = float(own[len(channels)]), float(own[len(channels) + 1])
+        counted = float(own[found]), float(own[found + 1])
     except (IndexError, ValueError):
         return names, units, None
-    found = len(channels) + 1
-    return ("time", *channels, *names[found:]), ("s", *own[: len(channels)], *units[found:]), counted
+    if cells[0] == "X":
+        cells[0], own[0] = "time", "s"
+    return (*cells[:found], *names[found:]), (*own[:found], *units[found:]), counted
 
 
 def _of_tektronix(lines: Sequence[str], encoding: str) -> Layout | None:
@@ -301,13 +305,15 @@ def _cut_heading(
     if first == 0 or delimiter == " ":
         return lines, ()
     cells = split(lines[first - 1], delimiter)
+    wider = len(cells) > width
     while cells and not cells[-1]:
         cells.pop()
     below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
     ended = bool(below) and all(row[-1] == "" for row in below)
     own, surplus = cells[: width - ended], cells[width - ended :]
     if (
-        len(cells) <= width
+        not wider
+        or len(cells) < width - ended
         or not all(own)
         or len(set(cells)) < len(cells)
         or any(is_number(cell, decimal) for cell in cells)

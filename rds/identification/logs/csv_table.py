@@ -128,7 +128,10 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
             columns[name] = Column(name, "s" if at in layout.dates else unit, values[at])
     if layout.counted is not None:
         begin, step = layout.counted
-        columns["time"] = replace(columns["time"], values=begin + step * columns["time"].values)
+        number = columns["time"].values if "time" in columns else np.arange(rows)
+        columns = {"time": Column("time", "s", begin + step * number)} | {
+            name: column for name, column in columns.items() if name != "time"
+        }
     if layout.times:
         columns = _with_own_times(columns, layout.times)
     return Table(path, "csv", columns, findings=tuple(findings))
