@@ -74,6 +74,8 @@ def read_other(file: TextIO, kind: str, path: str, skip: Callable[[], None]) -> 
             continue
         try:
             message = parse(text)
+        except InputError as error:
+            raise InputError(str(error), f"{path}:{number}") from error
         except (ValueError, IndexError, KeyError) as error:
             raise InputError(
                 f"it can't be read as a line of {kind} ({error}): {text[:60]!r}; correct the line, or take it out",
@@ -131,6 +133,9 @@ class _BusMaster:
         if line.startswith("***"):
             if "***DEC***" in line:
                 self._base = 10
+            if "***RELATIVE MODE***" in line:
+                what = "its head says RELATIVE MODE: distances to the line before, which are no times; "
+                raise InputError(what + "log in BusMaster with system or absolute time")
             return None
         words = line.split()
         if len(words) < 6 or ":" not in words[0]:
