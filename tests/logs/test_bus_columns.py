@@ -9,6 +9,7 @@ import can
 import pytest
 
 from rds.bus.modules.rds.frames import COMMAND
+from rds.bus.tools.decode import load_dbc
 from rds.core.errors import InputError
 from rds.identification.logs.describe import describe
 from rds.identification.logs.log import Gravity, Log
@@ -151,3 +152,12 @@ def test_a_log_of_frames_that_no_bus_could_carry_is_told_as_that(tmp_path: Path)
     (tmp_path / "a.csv").write_text("Time Stamp,ID,Extended,Bus,LEN,D1\n1000,00000900,false,0,1,FE,\n")
     with pytest.raises(InputError, match="no bus could carry any of its 1 frames"):
         read_log(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("coding", ["cp1252", "utf-8", "utf-8-sig"])
+def test_units_of_a_dbc_are_read_in_the_coding_that_it_is_in(tmp_path: Path, coding: str) -> None:
+    """Vector's tools write code page 1252, many others UTF-8."""
+    path = tmp_path / "axes.dbc"
+    path.write_bytes(DBC.replace('"mm"', '"µm"').encode(coding))
+    units = {signal.unit for message in load_dbc(path).messages for signal in message.signals}
+    assert "µm" in units and not any("Â" in unit for unit in units if unit)
