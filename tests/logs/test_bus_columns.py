@@ -161,3 +161,36 @@ def test_units_of_a_dbc_are_read_in_the_coding_that_it_is_in(tmp_path: Path, cod
     path.write_bytes(DBC.replace('"mm"', '"µm"').encode(coding))
     units = {signal.unit for message in load_dbc(path).messages for signal in message.signals}
     assert "µm" in units and not any("Â" in unit for unit in units if unit)
+
+
+GVRET_HEAD = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "row"),
+    [
+        ("bus.log", "", "({t:.6f}) can{c} {i:03X}#{d}\n"),
+        ("bus.asc", "base hex  timestamps absolute\nno internal events logged\n", "{t:.6f} {c} {i:X} Rx d 8 {s}\n"),
+        ("bus.txt", "", " ({t:.6f})  can{c}  {i:03X}   [8]  {s}\n"),
+        ("bus.csv", GVRET_HEAD, "{m},{i:08X},false,Rx,{c},8,{b}\n"),
+        ("bus.crtd", "0.000 CXX made\n", "{t:.6f} {c}R11 {i:X} {s}\n"),
+    ],
+)
+@pytest.mark.parametrize("channels", [1, 2])
+def test_two_channels_of_a_recorder_are_never_one_column(
+    tmp_path: Path, name: str, head: str, row: str, channels: int
+) -> None:
+    """Two axes of one kind on two buses use the same identifiers."""
+    text = head
+    for at, (t, i, data) in enumerate(frames()):
+        s = data.hex(" ").upper()
+        c, b, m = 1 + at // 2 % channels, s.replace(" ", ","), round(t * 1e6)
+        text += row.format(t=t + 1, m=m, c=c, i=i, d=data.hex(), s=s, b=b)
+    (tmp_path / name).write_text(text)
+    (tmp_path / "a.dbc").write_text(DBC)
+    (tmp_path / f"{name}.map.toml").write_text(MAP.replace(', "b.dbc"', ""))
+    if channels == 1:
+        assert len(read_log(tmp_path / name)[0]) == 200
+    else:
+        with pytest.raises(InputError, match=r"Drive\.Voltage \(0x100\) was received on two channels"):
+            read_log(tmp_path / name)
