@@ -207,3 +207,16 @@ def test_no_line_is_lost_below_a_head_of_asc_that_does_not_end(head: str, first:
     assert (len(frames), log.skipped) == (5, 0)
     assert [bytes(m.data) for m in frames[1:]] == [bytes([1, k]) for k in range(2, 6)]
     assert frames[0].is_error_frame == ("ErrorFrame" in first)
+
+
+def test_distances_of_candump_are_refused_where_the_first_line_is_not_there(tmp_path: Path) -> None:
+    """`candump -t d` begins with a zero, which `grep` leaves out."""
+    rows = "".join(f" (000.01{k % 3:04d})  can0  123   [2]  01 0{k}\n" for k in range(9))
+    (tmp_path / "a.log").write_text(rows)
+    with pytest.raises(InputError, match=r"a\.log:4: .*goes back"):
+        list(LogFile(tmp_path / "a.log"))
+
+
+def test_a_clock_that_is_set_back_is_no_distance(tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(CANDUMP.replace("1436509052.25", "1436509050.25"))
+    assert len(list(LogFile(tmp_path / "a.log"))) == 2

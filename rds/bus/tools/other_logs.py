@@ -17,6 +17,7 @@ from rds.core.errors import InputError
 
 _HEAD = 2048  # characters that are looked at
 _STANDARD = 0x7FF
+_DATED = 1e8  # s: times beyond are of a clock, which may be set back; below they begin with the recording
 Parse = Callable[[str], can.Message | None]  # a line; None: it describes no frame. ValueError, IndexError: damaged
 
 _CRTD = re.compile(r"\d+\.\d+\s+\d*(?:[RT](?:11|29)|C[A-Z]{2})\b")
@@ -208,7 +209,7 @@ class _Candump:
         remote = words[:1] == ["remote"]
         data = b"" if remote else bytes(int(word, 16) for word in words[:size])
         stamp = float(found["time"]) if found["time"] else datetime.fromisoformat(found["date"]).timestamp()
-        if self._times and self._times[0] == 0.0 and stamp < self._times[-1]:
+        if self._times and self._times[0] < _DATED and stamp < self._times[-1]:
             raise ValueError("its time goes back: `candump -t d` writes the distance to the frame before; use -t a")
         self._times = [*self._times[:1], stamp]
         received, channel = found["way"] != "TX", found["channel"]
