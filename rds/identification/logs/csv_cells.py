@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import re
 from collections.abc import Sequence
+from pathlib import Path
+
+from rds.core.limits import LINE
 
 COMMENTS = ("#", "%", "//", "!")
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
@@ -18,6 +22,26 @@ BLANKS = frozenset(
 )
 DATE = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
 CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
+
+_BLOCK = 1 << 22  # bytes
+
+
+def not_in_utf_8(path: Path) -> tuple[int, bytes] | None:
+    """Number and bytes of the first line that is not in UTF-8, but for a last one without its end; None for none."""
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    with open(path, "rb") as stream:
+        try:
+            while block := stream.read(_BLOCK):
+                decoder.decode(block)
+            return None
+        except UnicodeDecodeError:
+            stream.seek(0)
+        for number, line in enumerate(iter(lambda: stream.readline(LINE), b""), 1):
+            try:
+                line.decode()
+            except UnicodeDecodeError:
+                return (number, line) if line.endswith(b"\n") else None
+    return None
 
 
 def split(line: str, delimiter: str) -> list[str]:

@@ -23,6 +23,7 @@ from rds.identification.logs.csv_cells import (
     are_numbers,
     is_comment,
     is_number,
+    not_in_utf_8,
     split,
 )
 from rds.identification.logs.csv_headings import Headings, alternates, labelled_headings, labview_units, name_and_unit
@@ -188,6 +189,11 @@ def _head(path: Path) -> tuple[list[str], str]:
     encoding = "utf-8"
     try:
         text = codecs.getincrementaldecoder("utf-8")().decode(data, whole)
+        if not whole and (line := not_in_utf_8(path)):
+            if not text.isascii():
+                what = f"it begins in UTF-8, and has bytes there that are none: {line[1][:40]!r}"
+                raise InputError(f"{what}; repair or remove the line", f"{path}, line {line[0]}")
+            encoding = "cp1252"
     except UnicodeDecodeError:
         encoding, text = "cp1252", data.decode("cp1252", errors="replace")
     if "\r" in text and "\n" not in text:
