@@ -109,6 +109,26 @@ def test_damaged_bytes_far_below_are_named_with_their_line(
         read_csv(path)
 
 
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        "16:20:01.{k:03d} -> ",
+        "[2024-01-01 16:20:01.{k:03d}] ",
+        "2024-01-01 16:20:01 ",
+        "[Mon Jan  1 16:20:01.{k:03d} 2024] ",
+    ],
+)
+def test_the_time_stamps_of_a_terminal_are_refused_with_how_to_take_them_out(tmp_path: Path, stamp: str) -> None:
+    """Else the first column, often the time of the microcontroller, would be words."""
+    path, rows = tmp_path / "log.txt", [f"{10 * k},{k % 2},{k / 10}" for k in range(50)]
+    path.write_text("".join(f"{stamp.format(k=k)}{row}\n" for k, row in enumerate(rows)))
+    with pytest.raises(InputError, match="a terminal's time stamp stands before each line") as caught:
+        read_csv(path)
+    first = int(str(caught.value).rpartition("cut -c")[2].partition("-")[0]) - 1
+    path.write_text("".join(f"{line[first:]}\n" for line in path.read_text().splitlines()))
+    assert [column.values[49] for column in read_csv(path).columns.values()] == [490.0, 1.0, 4.9]
+
+
 def test_words_are_kept_apart_and_named_where_a_number_should_be(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(

@@ -22,7 +22,9 @@ BLANKS = frozenset(
 )
 DATE = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
 CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
-
+# before each line that a terminal shows: `16:20:01.123 -> ` of the Arduino IDE, `[2024-01-01 16:20:01.123] ` of others
+_DAY = r"(?:\d{4}-\d\d-\d\d[ T]|\w{3} \w{3} [ \d]\d )?"
+_STAMP = re.compile(rf"\[?{_DAY}\d\d:\d\d:\d\d(?:[.,]\d+)?(?: \d{{4}})?\]?\s*(?:->|>)?\s+")
 _BLOCK = 1 << 22  # bytes
 
 
@@ -64,6 +66,14 @@ def is_number(cell: str, decimal: str) -> bool:
     except ValueError:
         return False
     return cell.lower() not in BLANKS and "_" not in cell
+
+
+def stamped(rows: Sequence[Sequence[str]], decimal: str) -> str:
+    """The time stamp that stands before the number in the first cell of every row; "" where one has none."""
+    found = [_STAMP.match(row[0]) for row in rows]
+    if all(stamp and is_number(row[0][stamp.end() :], decimal) for stamp, row in zip(found, rows, strict=True)):
+        return next((stamp[0] for stamp in found if stamp), "")
+    return ""
 
 
 def are_numbers(cells: Sequence[str]) -> bool:

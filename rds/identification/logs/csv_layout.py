@@ -25,6 +25,7 @@ from rds.identification.logs.csv_cells import (
     is_number,
     not_in_utf_8,
     split,
+    stamped,
 )
 from rds.identification.logs.csv_headings import Headings, alternates, labelled_headings, labview_units, name_and_unit
 from rds.identification.logs.units import dimension, plain
@@ -108,6 +109,10 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     if labelled:  # most rows may be shorter, as channels end one after another
         first = _below_labels(lines, first, mark, point, width)
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
+    if stamp := stamped(body[:_FEW], point):
+        what = f"a terminal's time stamp stands before each line ({stamp!r}), and its first column cannot be read; "
+        cut = f"cut {len(stamp)} characters off: `cut -c{len(stamp) + 1}- FILE > log.csv`"
+        raise InputError(f"{what}switch the stamps off there, or {cut}", str(path))
     stamps = {i: found for i in range(width) for row in body[:1] if (found := DATE.fullmatch(row[i]))}
     clocks = frozenset(i for i in range(width) for row in body[:1] if CLOCK.fullmatch(row[i]))
     dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()} | dict.fromkeys(clocks, False)
