@@ -84,6 +84,26 @@ def test_an_oscilloscope_tells_start_and_step_with_the_samples_counted_or_not(
     assert np.allclose(table.columns["CH2"].values, X[:400], rtol=1e-5)
 
 
+@pytest.mark.parametrize("timed", [False, True])
+def test_newer_oscilloscopes_of_rigol_head_units_start_and_step_in_one_line(timed: bool, tmp_path: Path) -> None:
+    head = f"{'Time(s),' * timed}CH1A,CH2V,t0 =-6.500000e+00, tInc = 8.000000e-06,\n"
+    rows = "".join(f"{f'{-6.5 + 8e-6 * k:.6f},' * timed}{U[k]:.5e},{X[k]:.5e},,\n" for k in range(400))
+    table = read_table(saved(tmp_path / "rigol.csv", head + rows))
+    found = list(table.columns.values())[:3]
+    assert [(column.name, column.unit) for column in found] == [("time", "s"), ("CH1", "A"), ("CH2", "V")]
+    assert np.allclose(found[0].values, -6.5 + 8e-6 * np.arange(400), atol=1e-9) and not table.findings
+
+
+def test_rohde_and_schwarz_head_the_time_by_its_unit_alone(tmp_path: Path) -> None:
+    rows = "".join(f"{k / 1e3:.6E},{U[k]:.5E},{X[k]:.5E}\n" for k in range(400))
+    table = read_table(saved(tmp_path / "rtb.csv", "in s,C1 in V,C2 in V\n" + rows))
+    assert [(column.name, column.unit) for column in table.columns.values()] == [
+        ("time", "s"),
+        ("C1", "V"),
+        ("C2", "V"),
+    ]
+
+
 @pytest.mark.parametrize("row", ["0,2.5,7.0,0.001", "0,2.5"])
 def test_a_first_row_of_another_width_is_not_passed_over_in_silence(row: str, tmp_path: Path) -> None:
     """A constant stands beside the first row alone, or a cell is missing there."""

@@ -27,7 +27,14 @@ from rds.identification.logs.csv_cells import (
     split,
     stamped,
 )
-from rds.identification.logs.csv_headings import Headings, alternates, labelled_headings, labview_units, name_and_unit
+from rds.identification.logs.csv_headings import (
+    Headings,
+    alternates,
+    labelled_headings,
+    labview_units,
+    name_and_unit,
+    of_rigol,
+)
 from rds.identification.logs.units import dimension, plain
 from rds.results.units import split_heading
 
@@ -36,9 +43,6 @@ HEAD = 1 << 16  # bytes looked at
 _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
 _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
-_RIGOL = re.compile(
-    r"(X,)?(CH\d,)+Start,Increment,?\s*"
-)  # an oscilloscope's first line; the second has units, start, step
 
 
 @dataclass(frozen=True)
@@ -95,6 +99,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     if mark == " " and labelled_headings(lines[:first], str.split) is not None:
         what = "its channels are headed by labels, and blanks stand between its cells, so that an empty one is lost"
         raise InputError(f"{what}; export it with semicolons between them (TwinCAT's scope asks for that)", str(path))
+    whole = lines
     found_heads = labelled_headings(lines[:first], lambda line: split(line, mark)) if mark != " " else None
     labelled = found_heads is not None
     surplus: tuple[str, ...] = ()
@@ -129,9 +134,9 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     numbers = [i for i in range(width) if any(is_number(row[i], point) for row in body[:_FEW])]
     passed = "" if labelled else _passed(lines[:first], mark, point, width, numbers)
     counted = None
-    told = next((n for n, line in enumerate(lines[:first]) if line.strip()), first)
-    if told + 1 < first and _RIGOL.fullmatch(lines[told]):
-        names, units, counted = _of_rigol(lines[told], lines[told + 1], names, units)
+    if found_rigol := of_rigol([line for line in whole[:first] if line.strip()], names, units):
+        names, units, counted = found_rigol
+        surplus = ()
     return Layout(
         encoding,
         mark,
@@ -259,21 +264,6 @@ def _passed(above: Sequence[str], delimiter: str, decimal: str, width: int, numb
         if are_numbers([cell for cell in cells if cell]):
             return line  # perhaps the first row, with a constant beside it
     return ""
-
-
-def _of_rigol(
-    head: str, below: str, names: tuple[str, ...], units: tuple[str | None, ...]
-) -> tuple[tuple[str, ...], tuple[str | None, ...], tuple[float, float] | None]:
-    """Names, units, and time of the first sample and step, of a table that counts the samples, or has them alone."""
-    cells, own = split(head, ","), split(below, ",")
-    found = cells.index("Start")
-    try:
-        counted = float(own[found]), float(own[found + 1])
-    except (IndexError, ValueError):
-        return names, units, None
-    if cells[0] == "X":
-        cells[0], own[0] = "time", "s"
-    return (*cells[:found], *names[found:]), (*own[:found], *units[found:]), counted
 
 
 def _of_tektronix(lines: Sequence[str], encoding: str) -> Layout | None:
