@@ -173,6 +173,8 @@ def replay(
         typer.echo(f"{result.sent} frames in {result.seconds:.1f} s, at most {result.latest * 1e3:.1f} ms late")
     for reason, number in result.skipped.items():
         _say(f"{number} frame{' was' if number == 1 else 's were'} left out: {reason}")
+    if len(result.channels) > 1:
+        _say(f"frames of {len(result.channels)} channels ({', '.join(result.channels)}) went onto this one bus")
     if log.impossible:
         _say(f"{log.impossible} frames of the log were left out: no bus could carry them (identifier, or length)")
     if log.skipped:

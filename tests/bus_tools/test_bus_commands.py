@@ -104,6 +104,19 @@ def test_record_until_ctrl_c_and_replay(
     assert found == list(range(50)) and bus.recv(0.2) is None
 
 
+def test_a_replay_says_that_a_log_has_frames_of_several_channels(
+    rds: Callable[..., subprocess.Popen[str]], open_bus: Opener, tmp_path: Path
+) -> None:
+    open_bus()
+    path = tmp_path / "a.log"
+    path.write_text("(1.0) can0 790#01\n(1.1) can1 790#02\n")
+    out, err = end(rds("replay", str(path), "--speed", "inf", "--json"))
+    assert json.loads(out)["channels"] == ["can0", "can1"]
+    assert "frames of 2 channels (can0, can1) went onto this one bus" in err
+    path.write_text("(1.0) can0 790#01\n(1.1) can0 790#02\n")
+    assert "channels" not in end(rds("replay", str(path), "--speed", "inf"))[1]
+
+
 def test_a_recording_that_is_not_complete_says_so(
     rds: Callable[..., subprocess.Popen[str]], open_bus: Opener, tmp_path: Path
 ) -> None:

@@ -186,3 +186,37 @@ def test_distances_between_the_frames_of_an_asc_are_not_taken_for_times(tmp_path
     else:
         with pytest.raises(InputError, match="distances to the line before"):
             list(LogFile(path))
+
+
+def test_distances_between_the_frames_of_busmaster_are_not_taken_for_times(tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(BUSMASTER.replace("SYSTEM MODE", "RELATIVE MODE"))
+    with pytest.raises(InputError, match=r"a\.log:6: its head says RELATIVE MODE"):
+        list(LogFile(tmp_path / "a.log"))
+
+
+@pytest.mark.parametrize(
+    "head", ["", "date Fri Mar 1 11:59:58.000 am 2024\nbase hex  timestamps absolute\n// version 8.0.0\n"]
+)
+@pytest.mark.parametrize("first", ["   0.001000 1  ErrorFrame\n", "   0.001000 1  181             Rx   d 2 01 00\n"])
+def test_no_line_is_lost_below_a_head_of_asc_that_does_not_end(head: str, first: str, tmp_path: Path) -> None:
+    """Converters leave out `internal events logged`; python-can's reader (4.6) then passes over one line more."""
+    rows = "".join(f"   0.00{k}000 1  181             Rx   d 2 01 0{k}\n" for k in range(2, 6))
+    (tmp_path / "log.asc").write_text(head + first + rows)
+    log = LogFile(tmp_path / "log.asc")
+    frames = list(log)
+    assert (len(frames), log.skipped) == (5, 0)
+    assert [bytes(m.data) for m in frames[1:]] == [bytes([1, k]) for k in range(2, 6)]
+    assert frames[0].is_error_frame == ("ErrorFrame" in first)
+
+
+def test_distances_of_candump_are_refused_where_the_first_line_is_not_there(tmp_path: Path) -> None:
+    """`candump -t d` begins with a zero, which `grep` leaves out."""
+    rows = "".join(f" (000.01{k % 3:04d})  can0  123   [2]  01 0{k}\n" for k in range(9))
+    (tmp_path / "a.log").write_text(rows)
+    with pytest.raises(InputError, match=r"a\.log:4: .*goes back"):
+        list(LogFile(tmp_path / "a.log"))
+
+
+def test_a_clock_that_is_set_back_is_no_distance(tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(CANDUMP.replace("1436509052.25", "1436509050.25"))
+    assert len(list(LogFile(tmp_path / "a.log"))) == 2

@@ -9,6 +9,7 @@ import can
 import pytest
 
 from rds.bus.modules.rds.frames import COMMAND
+from rds.bus.tools.decode import load_dbc
 from rds.core.errors import InputError
 from rds.identification.logs.describe import describe
 from rds.identification.logs.log import Gravity, Log
@@ -151,3 +152,45 @@ def test_a_log_of_frames_that_no_bus_could_carry_is_told_as_that(tmp_path: Path)
     (tmp_path / "a.csv").write_text("Time Stamp,ID,Extended,Bus,LEN,D1\n1000,00000900,false,0,1,FE,\n")
     with pytest.raises(InputError, match="no bus could carry any of its 1 frames"):
         read_log(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("coding", ["cp1252", "utf-8", "utf-8-sig"])
+def test_units_of_a_dbc_are_read_in_the_coding_that_it_is_in(tmp_path: Path, coding: str) -> None:
+    """Vector's tools write code page 1252, many others UTF-8."""
+    path = tmp_path / "axes.dbc"
+    path.write_bytes(DBC.replace('"mm"', '"µm"').encode(coding))
+    units = {signal.unit for message in load_dbc(path).messages for signal in message.signals}
+    assert "µm" in units and not any("Â" in unit for unit in units if unit)
+
+
+GVRET_HEAD = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "row"),
+    [
+        ("bus.log", "", "({t:.6f}) can{c} {i:03X}#{d}\n"),
+        ("bus.asc", "base hex  timestamps absolute\nno internal events logged\n", "{t:.6f} {c} {i:X} Rx d 8 {s}\n"),
+        ("bus.txt", "", " ({t:.6f})  can{c}  {i:03X}   [8]  {s}\n"),
+        ("bus.csv", GVRET_HEAD, "{m},{i:08X},false,Rx,{c},8,{b}\n"),
+        ("bus.crtd", "0.000 CXX made\n", "{t:.6f} {c}R11 {i:X} {s}\n"),
+    ],
+)
+@pytest.mark.parametrize("channels", [1, 2])
+def test_two_channels_of_a_recorder_are_never_one_column(
+    tmp_path: Path, name: str, head: str, row: str, channels: int
+) -> None:
+    """Two axes of one kind on two buses use the same identifiers."""
+    text = head
+    for at, (t, i, data) in enumerate(frames()):
+        s = data.hex(" ").upper()
+        c, b, m = 1 + at // 2 % channels, s.replace(" ", ","), round(t * 1e6)
+        text += row.format(t=t + 1, m=m, c=c, i=i, d=data.hex(), s=s, b=b)
+    (tmp_path / name).write_text(text)
+    (tmp_path / "a.dbc").write_text(DBC)
+    (tmp_path / f"{name}.map.toml").write_text(MAP.replace(', "b.dbc"', ""))
+    if channels == 1:
+        assert len(read_log(tmp_path / name)[0]) == 200
+    else:
+        with pytest.raises(InputError, match=r"Drive\.Voltage \(0x100\) was received on two channels"):
+            read_log(tmp_path / name)

@@ -80,6 +80,55 @@ def test_a_preamble_and_remarks_between_rows_and_a_windows_code_page(tmp_path: P
     assert [f.kind for f in table.findings] == ["encoding", "comments"]
 
 
+LONG = "".join(f"{i / 1e3:.6f},1.000000,{i / 1e2:.6f}\n" for i in range(4000)).encode()  # beyond what is looked at
+
+
+@pytest.mark.parametrize("word", ["Störung".encode("cp1252"), "警告".encode("shift-jis"), b"\x81\x8d"])
+@pytest.mark.parametrize("late", [False, True])
+def test_words_of_other_code_pages_are_read_wherever_they_stand(tmp_path: Path, word: bytes, late: bool) -> None:
+    """Bytes that are no UTF-8, and none of code page 1252 either, among the first rows and far below."""
+    path = tmp_path / "log.csv"
+    rows = LONG.replace(b"\n", b",ok\n")
+    path.write_bytes(b"t [s],u [V],x [mm],state\n" + rows * late + b"5,1,2," + word + b"\n6,1,3,ok\n")
+    table = read_csv(path)
+    assert len(table.columns["x"].values) == 4000 * late + 2 and table.columns["x"].values[-1] == 3.0
+    assert [f.kind for f in table.findings] == ["encoding"]
+
+
+@pytest.mark.parametrize("row", [b"4.0,1,\xb0\xff7,9", b"\0" * 40 + b"\xff" * 40])
+def test_damaged_bytes_far_below_are_named_with_their_line(
+    tmp_path: Path, row: bytes, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"t [s],u [V],x [mm]\n" + LONG + row + b"\n5.0,1,2\n")
+    with pytest.raises(InputError, match=r"log\.csv, line 4002: it has \d cells .* repair or remove"):
+        read_csv(path)
+    assert not capfd.readouterr().err
+    path.write_bytes("t [s],u [V],x [µm]\n".encode() + LONG + row + b"\n5.0,1,2\n")
+    with pytest.raises(InputError, match=r"log\.csv, line 4002: it begins in UTF-8"):
+        read_csv(path)
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        "16:20:01.{k:03d} -> ",
+        "[2024-01-01 16:20:01.{k:03d}] ",
+        "2024-01-01 16:20:01 ",
+        "[Mon Jan  1 16:20:01.{k:03d} 2024] ",
+    ],
+)
+def test_the_time_stamps_of_a_terminal_are_refused_with_how_to_take_them_out(tmp_path: Path, stamp: str) -> None:
+    """Else the first column, often the time of the microcontroller, would be words."""
+    path, rows = tmp_path / "log.txt", [f"{10 * k},{k % 2},{k / 10}" for k in range(50)]
+    path.write_text("".join(f"{stamp.format(k=k)}{row}\n" for k, row in enumerate(rows)))
+    with pytest.raises(InputError, match="a terminal's time stamp stands before each line") as caught:
+        read_csv(path)
+    first = int(str(caught.value).rpartition("cut -c")[2].partition("-")[0]) - 1
+    path.write_text("".join(f"{line[first:]}\n" for line in path.read_text().splitlines()))
+    assert [column.values[49] for column in read_csv(path).columns.values()] == [490.0, 1.0, 4.9]
+
+
 def test_words_are_kept_apart_and_named_where_a_number_should_be(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(

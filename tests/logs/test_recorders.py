@@ -66,6 +66,60 @@ def test_headings_without_cells_leave_the_others_their_names(tmp_path: Path) -> 
     assert list(table.columns) == ["CH1", "CH2"] and "'Start', 'Increment'" in table.findings[0].what
 
 
+@pytest.mark.parametrize("top", ["", "\n"])
+@pytest.mark.parametrize("counted", [False, True])
+def test_an_oscilloscope_tells_start_and_step_with_the_samples_counted_or_not(
+    top: str, counted: bool, tmp_path: Path
+) -> None:
+    """Rigol's `CH1,CH2,Start,Increment`, with and without the `X` that counts the samples."""
+    head = "X,CH1,CH2,Start,Increment,\nSequence," if counted else "CH1,CH2,Start,Increment,\n"
+    rows = "".join(f"{f'{k},' * counted}{U[k]:.5e},{X[k]:.5e},\n" for k in range(400))
+    table = read_table(saved(tmp_path / "rigol.csv", f"{top}{head}Volt,Volt,-6.0e-02,1.0e-04\n{rows}"))
+    assert [(column.name, column.unit) for column in table.columns.values()] == [
+        ("time", "s"),
+        ("CH1", "Volt"),
+        ("CH2", "Volt"),
+    ]
+    assert np.allclose(table.columns["time"].values, -0.06 + 1e-4 * np.arange(400))
+    assert np.allclose(table.columns["CH2"].values, X[:400], rtol=1e-5)
+
+
+@pytest.mark.parametrize("timed", [False, True])
+def test_newer_oscilloscopes_of_rigol_head_units_start_and_step_in_one_line(timed: bool, tmp_path: Path) -> None:
+    head = f"{'Time(s),' * timed}CH1A,CH2V,t0 =-6.500000e+00, tInc = 8.000000e-06,\n"
+    rows = "".join(f"{f'{-6.5 + 8e-6 * k:.6f},' * timed}{U[k]:.5e},{X[k]:.5e},,\n" for k in range(400))
+    table = read_table(saved(tmp_path / "rigol.csv", head + rows))
+    found = list(table.columns.values())[:3]
+    assert [(column.name, column.unit) for column in found] == [("time", "s"), ("CH1", "A"), ("CH2", "V")]
+    assert np.allclose(found[0].values, -6.5 + 8e-6 * np.arange(400), atol=1e-9) and not table.findings
+
+
+def test_rohde_and_schwarz_head_the_time_by_its_unit_alone(tmp_path: Path) -> None:
+    rows = "".join(f"{k / 1e3:.6E},{U[k]:.5E},{X[k]:.5E}\n" for k in range(400))
+    table = read_table(saved(tmp_path / "rtb.csv", "in s,C1 in V,C2 in V\n" + rows))
+    assert [(column.name, column.unit) for column in table.columns.values()] == [
+        ("time", "s"),
+        ("C1", "V"),
+        ("C2", "V"),
+    ]
+
+
+@pytest.mark.parametrize("row", ["0,2.5,7.0,0.001", "0,2.5"])
+def test_a_first_row_of_another_width_is_not_passed_over_in_silence(row: str, tmp_path: Path) -> None:
+    """A constant stands beside the first row alone, or a cell is missing there."""
+    rows = "".join(f"{k},{U[k]:.5f},{X[k]:.5f}\n" for k in range(1, 100))
+    table = read_table(saved(tmp_path / "a.csv", f"t [ms],u [V],x [mm],T\n{row}\n{rows}"))
+    assert any(row in finding.what and finding.gravity == "warning" for finding in table.findings)
+
+
+@pytest.mark.parametrize("end", ["", ","])
+def test_a_heading_may_end_in_a_delimiter_where_its_rows_do_not(end: str, tmp_path: Path) -> None:
+    rows = "".join(f"{k},{U[k]:.5f},{X[k]:.5f}{end}\n" for k in range(100))
+    table = read_table(saved(tmp_path / "a.csv", f"t [ms],u [V],x [mm],{end}\n{rows}"))
+    assert [(column.name, column.unit) for column in table.columns.values()] == [("t", "ms"), ("u", "V"), ("x", "mm")]
+    assert not table.findings
+
+
 def test_a_heading_above_a_numbered_line_names_nothing(tmp_path: Path) -> None:
     """Numbers wider than the rows are no headings."""
     table = read_table(saved(tmp_path / "a.csv", "7,8,9,10\n" + "1,2,3\n2,3,4\n" * 5))

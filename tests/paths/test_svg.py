@@ -157,3 +157,21 @@ def test_numbers_too_large_for_a_drawing_are_refused(tmp_path: Path, inner: str)
     path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {SIZE}>{inner}</svg>')
     with pytest.raises(InputError, match=r"part\.svg: .*correct it"):
         read_vector_drawing(str(path))
+
+
+@pytest.mark.parametrize("coding", ["shift-jis", "gbk", "euc-jp", "no-such-coding", "hex", "idna"])
+def test_codings_that_the_reader_of_xml_does_not_know_are_refused(tmp_path: Path, coding: str) -> None:
+    path = tmp_path / "a.svg"
+    path.write_text(
+        f'<?xml version="1.0" encoding="{coding}"?><svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"/>'
+    )
+    with pytest.raises(InputError, match="save it as plain SVG in UTF-8"):
+        read_svg(path)
+
+
+@pytest.mark.parametrize("coding", ["utf-8", "utf-16"])
+def test_entities_are_refused_in_every_coding(tmp_path: Path, coding: str) -> None:
+    text = '<!DOCTYPE svg [<!ENTITY a "b">]><svg xmlns="http://www.w3.org/2000/svg"><desc>&a;</desc></svg>'
+    (tmp_path / "a.svg").write_text(text, encoding=coding)
+    with pytest.raises(InputError, match="defines entities"):
+        read_svg(tmp_path / "a.svg")

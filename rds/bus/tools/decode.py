@@ -110,7 +110,7 @@ def load_dbc(path: Path) -> Any:
     size = path.stat().st_size
     allow(size, _LARGEST, f"it has {size} bytes", "give a part of it", path)
     try:
-        return cantools.database.load_file(path, strict=False)
+        return cantools.database.load_file(path, encoding=_encoding(path.read_bytes()), strict=False)
     # cantools raises errors of its parsers, of textparser and plain ones
     except Exception as error:
         reason = str(error).strip() or type(error).__name__
@@ -120,6 +120,18 @@ def load_dbc(path: Path) -> Any:
         if "more than 11 bits" in reason:
             remedy = "where its frames are extended ones, add 2147483648 (2^31) to the number behind BO_"
         raise InputError(f"it can't be read as a DBC file: {reason}; {remedy}", str(path)) from error
+
+
+def _encoding(data: bytes) -> str | None:
+    """UTF-8, with or without its mark, where a file is in it; None: what cantools takes, for DBC code page 1252.
+
+    `°` in UTF-8 would else be the unit `Â°`, which nobody knows.
+    """
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return None
+    return "utf-8-sig"
 
 
 def _by_databases(databases: Sequence[Any], message: can.Message) -> Decoded | None:

@@ -34,10 +34,14 @@ _CSV_HEADING = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 
 
 class Rules(NamedTuple):
-    """Of a text format: what is wrong with a line, and whether it should have given a frame (None: a comment)."""
+    """Of a text format: what is wrong with a line, and whether it should have given a frame (None: a comment).
+
+    `opening` is a line that the reader needs above the first line that is no heading: it passes over the next one.
+    """
 
     check: Callable[[str, int], str | None]
     is_frame: Callable[[str], bool | None]
+    opening: str = ""
 
 
 class Lines:
@@ -52,8 +56,8 @@ class Lines:
         self._characters = 0
         self._longest = int(_LONGEST * lifted())
         self._path = path
-        self._check, self._is_frame = rules
-        self._line = ""
+        self._check, self._is_frame, self._opening = rules
+        self._line = self._held = ""
         self.number = 0
         self.frames = 0  # that came of the last line
         self.skipped = 0  # lines of other things than frames, comments and headings
@@ -64,12 +68,17 @@ class Lines:
 
     def __next__(self) -> str:
         self._look_back()
-        while True:
+        while not self._held:
             self._line = self._next()
             self.number += 1
             self.frames = 0
             if self._line.strip():
                 break
+        if self._held:
+            self._line, self._held, self.frames = self._held, "", 0
+        elif self._opening and self._is_frame(self._line.strip()) is not None:
+            self._held, self._line, self._opening = self._line, self._opening, ""
+            return self._line
         problem = self._check(self._line.strip(), self.number)
         if problem:
             raise self.fault(problem)
@@ -161,7 +170,7 @@ def _csv_frame(line: str) -> bool | None:
     return None if line == _CSV_HEADING else True
 
 
-ASC = Rules(_anything, _asc_frame)
+ASC = Rules(_anything, _asc_frame, "no internal events logged\n")
 CANDUMP = Rules(_check_candump, _always)
 TRC = Rules(_anything, _trc_frame)
 CSV = Rules(_check_csv, _csv_frame)

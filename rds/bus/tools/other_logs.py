@@ -17,13 +17,14 @@ from rds.core.errors import InputError
 
 _HEAD = 2048  # characters that are looked at
 _STANDARD = 0x7FF
+_DATED = 1e8  # s: times beyond are of a clock, which may be set back; below they begin with the recording
 Parse = Callable[[str], can.Message | None]  # a line; None: it describes no frame. ValueError, IndexError: damaged
 
 _CRTD = re.compile(r"\d+\.\d+\s+\d*(?:[RT](?:11|29)|C[A-Z]{2})\b")
 _MICROCHIP = re.compile(r"\s*(?://-{3,}|Microchip Technology)")
 _BUSMASTER = re.compile(r"\*{3}BUSMASTER")
 _SHOWN_FRAME = (
-    r"\S+\s+(?:(?P<way>RX|TX)\s+(?P<switched>\S)\s+(?P<passive>\S)\s+)?"
+    r"(?P<channel>\S+)\s+(?:(?P<way>RX|TX)\s+(?P<switched>\S)\s+(?P<passive>\S)\s+)?"
     r"(?P<id>[0-9A-F]{3}|[0-9A-F]{8})\s+\[(?P<size>\d+)\]"
 )
 _SHOWN = re.compile(rf"\s*\((?:(?P<time>\d+\.\d+)|(?P<date>\d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+))\)\s+{_SHOWN_FRAME}")
@@ -74,6 +75,8 @@ def read_other(file: TextIO, kind: str, path: str, skip: Callable[[], None]) -> 
             continue
         try:
             message = parse(text)
+        except InputError as error:
+            raise InputError(str(error), f"{path}:{number}") from error
         except (ValueError, IndexError, KeyError) as error:
             raise InputError(
                 f"it can't be read as a line of {kind} ({error}): {text[:60]!r}; correct the line, or take it out",
@@ -86,7 +89,14 @@ def read_other(file: TextIO, kind: str, path: str, skip: Callable[[], None]) -> 
 
 
 def _message(
-    stamp: float, identifier: int, extended: bool, data: bytes, size: int, is_rx: bool = True, remote: bool = False
+    stamp: float,
+    identifier: int,
+    extended: bool,
+    data: bytes,
+    size: int,
+    is_rx: bool = True,
+    remote: bool = False,
+    channel: str | None = None,
 ) -> can.Message:
     if not remote and len(data) < size:
         raise ValueError(f"{len(data)} bytes of data, and its length says {size}")
@@ -98,6 +108,7 @@ def _message(
         dlc=size,
         data=b"" if remote else data[:size],
         is_rx=is_rx,
+        channel=channel,
     )
 
 
@@ -118,7 +129,8 @@ class _Gvret:
         data = bytes(int(word, 16) for word in words[first : first + size])
         extended = row["extended"].lower() in ("true", "1")
         stamp = int(row["timestamp"]) * 1e-6
-        return _message(stamp, int(row["id"], 16), extended, data, size, row.get("dir", "Rx").lower() != "tx")
+        received = row.get("dir", "Rx").lower() != "tx"
+        return _message(stamp, int(row["id"], 16), extended, data, size, received, channel=row.get("bus"))
 
 
 class _BusMaster:
@@ -131,6 +143,9 @@ class _BusMaster:
         if line.startswith("***"):
             if "***DEC***" in line:
                 self._base = 10
+            if "***RELATIVE MODE***" in line:
+                what = "its head says RELATIVE MODE: distances to the line before, which are no times; "
+                raise InputError(what + "log in BusMaster with system or absolute time")
             return None
         words = line.split()
         if len(words) < 6 or ":" not in words[0]:
@@ -142,7 +157,8 @@ class _BusMaster:
             return None
         data = bytes(int(word, self._base) for word in words[6 : 6 + size])
         identifier = int(words[3], self._base)
-        return _message(stamp, identifier, kind[0] == "x", data, size, words[1].lower() != "tx", kind.endswith("r"))
+        received, remote = words[1].lower() != "tx", kind.endswith("r")
+        return _message(stamp, identifier, kind[0] == "x", data, size, received, remote, words[2])
 
 
 class _Crtd:
@@ -151,10 +167,12 @@ class _Crtd:
     def __call__(self, line: str) -> can.Message | None:
         words = line.split()
         kind = words[1].lstrip("0123456789").upper()
+        bus = words[1][: len(words[1]) - len(kind)] or None
         if kind not in ("R11", "R29", "T11", "T29"):
             return None
         data = bytes(int(word, 16) for word in words[3:])
-        return _message(float(words[0]), int(words[2], 16), kind.endswith("29"), data, len(data), kind[0] == "R")
+        received = kind[0] == "R"
+        return _message(float(words[0]), int(words[2], 16), kind.endswith("29"), data, len(data), received, channel=bus)
 
 
 class _Microchip:
@@ -191,10 +209,11 @@ class _Candump:
         remote = words[:1] == ["remote"]
         data = b"" if remote else bytes(int(word, 16) for word in words[:size])
         stamp = float(found["time"]) if found["time"] else datetime.fromisoformat(found["date"]).timestamp()
-        if self._times and self._times[0] == 0.0 and stamp < self._times[-1]:
+        if self._times and self._times[0] < _DATED and stamp < self._times[-1]:
             raise ValueError("its time goes back: `candump -t d` writes the distance to the frame before; use -t a")
         self._times = [*self._times[:1], stamp]
-        message = _message(stamp, int(identifier, 16), len(identifier) > 3, data, size, found["way"] != "TX", remote)
+        received, channel = found["way"] != "TX", found["channel"]
+        message = _message(stamp, int(identifier, 16), len(identifier) > 3, data, size, received, remote, channel)
         message.is_fd = len(found["size"]) == 2
         message.bitrate_switch = message.is_fd and found["switched"] == "B"
         message.error_state_indicator = message.is_fd and found["passive"] == "E"

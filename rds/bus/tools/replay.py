@@ -31,6 +31,7 @@ class Replay:
 
     sent: int = 0
     skipped: dict[str, int] = field(default_factory=dict)  # frames that were left out, by reason
+    channels: list[str] = field(default_factory=list)  # of the recorder, whose frames went onto this one bus
     seconds: float = 0.0
     latest: float = 0.0  # s, by how much a frame was sent too late, at most
     loops: int = 0
@@ -76,7 +77,7 @@ def replay(
         modules = live_modules(bus)
         if modules:
             raise refusal(part.acts, part.acting - 1, modules)
-    result = Replay(skipped=part.skipped)
+    result = Replay(skipped=part.skipped, channels=sorted(part.channels))
     try:
         _send_all(part, bus, result, speed, loops, stop or threading.Event(), progress, with_commands)
     finally:
@@ -96,11 +97,14 @@ class _Part:
         self.acts: can.Message | None = None  # the first frame that acts on a machine
         self.acting = 0  # how many do
         self.commands = False
+        self.channels: set[str] = set()
         self.first = self.last = 0.0  # s in the log
         for at, message in self:
             self.first = at if not self.frames else self.first
             self.last = max(self.last, at)
             self.frames += 1
+            if message.channel is not None:
+                self.channels.add(str(message.channel))
             if acts_on_machine(message) is not None:
                 self.acts = self.acts or message
                 self.acting += 1

@@ -41,7 +41,7 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
     times: dict[str, array[float]] = {}
     values: dict[str, array[float]] = {}
     units: dict[str, str | None] = {}
-    senders: dict[str, int] = {}  # the identifier of the frames that a column is from
+    senders: dict[str, tuple[int, Any]] = {}  # identifier and channel of the frames that a column is from
     unknown: dict[int, int] = {}
     misfits = number = 0
     misfit = ""  # the first one's reason
@@ -71,13 +71,9 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
         for name, unit, value in signals:
             if name not in times:
                 times[name], values[name], units[name] = array("d"), array("d"), unit
-                senders[name] = message.arbitration_id
-            elif senders[name] != message.arbitration_id:
-                raise InputError(
-                    f"{name} is in frames of {senders[name]:#x} and of {message.arbitration_id:#x}, and would be one "
-                    "column; rename one of the two messages in the DBC files",
-                    str(path),
-                )
+                senders[name] = message.arbitration_id, message.channel
+            elif senders[name] != (message.arbitration_id, message.channel):
+                raise _two_senders(name, senders[name], message, path)
             times[name].append(message.timestamp - start)
             values[name].append(value)
     if not number:
@@ -117,6 +113,17 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
         for name in sorted(times)
     }
     return Table(path, "can", columns, findings=tuple(findings))
+
+
+def _two_senders(name: str, before: tuple[int, Any], message: can.Message, path: Path) -> InputError:
+    """The error that a signal is in frames of two identifiers, or on two channels of the recorder."""
+    identifier, channel = before
+    if identifier != message.arbitration_id:
+        what = f"{name} is in frames of {identifier:#x} and of {message.arbitration_id:#x}, and would be one column"
+        return InputError(f"{what}; rename one of the two messages in the DBC files", str(path))
+    what = f"{name} ({identifier:#x}) was received on two channels, {channel} and {message.channel}, and would be one "
+    remedy = "column; make a log of one of them, in Python `with can.Logger('one.log') as log: [log(m) for m in "
+    return InputError(f"{what}{remedy}can.LogReader(FILE) if m.channel == {channel!r}]`", str(path))
 
 
 def _ends(path: Path) -> bool:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import re
 from collections.abc import Sequence
+from pathlib import Path
+
+from rds.core.limits import LINE
 
 COMMENTS = ("#", "%", "//", "!")
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
@@ -18,6 +22,28 @@ BLANKS = frozenset(
 )
 DATE = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
 CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
+# before each line that a terminal shows: `16:20:01.123 -> ` of the Arduino IDE, `[2024-01-01 16:20:01.123] ` of others
+_DAY = r"(?:\d{4}-\d\d-\d\d[ T]|\w{3} \w{3} [ \d]\d )?"
+_STAMP = re.compile(rf"\[?{_DAY}\d\d:\d\d:\d\d(?:[.,]\d+)?(?: \d{{4}})?\]?\s*(?:->|>)?\s+")
+_BLOCK = 1 << 22  # bytes
+
+
+def not_in_utf_8(path: Path) -> tuple[int, bytes] | None:
+    """Number and bytes of the first line that is not in UTF-8, but for a last one without its end; None for none."""
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    with open(path, "rb") as stream:
+        try:
+            while block := stream.read(_BLOCK):
+                decoder.decode(block)
+            return None
+        except UnicodeDecodeError:
+            stream.seek(0)
+        for number, line in enumerate(iter(lambda: stream.readline(LINE), b""), 1):
+            try:
+                line.decode()
+            except UnicodeDecodeError:
+                return (number, line) if line.endswith(b"\n") else None
+    return None
 
 
 def split(line: str, delimiter: str) -> list[str]:
@@ -40,6 +66,14 @@ def is_number(cell: str, decimal: str) -> bool:
     except ValueError:
         return False
     return cell.lower() not in BLANKS and "_" not in cell
+
+
+def stamped(rows: Sequence[Sequence[str]], decimal: str) -> str:
+    """The time stamp that stands before the number in the first cell of every row; "" where one has none."""
+    found = [_STAMP.match(row[0]) for row in rows]
+    if all(stamp and is_number(row[0][stamp.end() :], decimal) for stamp, row in zip(found, rows, strict=True)):
+        return next((stamp[0] for stamp in found if stamp), "")
+    return ""
 
 
 def are_numbers(cells: Sequence[str]) -> bool:

@@ -24,6 +24,10 @@ _SCALES = (("scalefactor", "1"), ("offset", "0"), ("unit scalefactor", "1"), ("u
 _LEAST_TIMES = 2  # columns of times
 _PAIR_NAMES, _PAIR_UNIT = ("name", "channel name"), "unit"
 _PAIR_TIMES = {"sampletime[ms]": "ms", "interval": "s"}  # which label says in which unit the times are
+# an oscilloscope's first line: `X,CH1,CH2,Start,Increment`, with units, start and step in the second one; of newer ones
+# `CH1A,CH2V,t0 =-6.5e+00, tInc = 8.0e-06`
+_RIGOL = re.compile(r"(X,)?(CH\d,)+Start,Increment,?\s*")
+_NEWER_RIGOL = re.compile(r"(Time\(s\),)?((?:CH\d+[VAW],)+)\s*t0\s*=([^,]*),\s*tInc\s*=([^,]*),?\s*")
 _TIMES_ALONE = ("ms", "us", "µs", "μs")  # headings of a time by its unit; `s` may be a way, `min` a least one
 
 
@@ -52,6 +56,8 @@ def name_and_unit(cell: str) -> tuple[str, str | None]:
     name, unit = split_heading(cell)
     if unit is not None or name in _TIMES_ALONE:
         return name, unit or name
+    if cell.startswith("in ") and dimension(cell[3:]) == "time":
+        return "time", cell[3:].strip()  # Rohde & Schwarz: `in s,C1 in V`
     if braced := _BRACES.fullmatch(cell):
         return braced["name"], braced["unit"].strip()
     for between in _BETWEEN.finditer(cell) if dimension(cell) is None else ():  # `mm/s` is no mm in s
@@ -124,3 +130,38 @@ def _labelled_unit(cell: str) -> str | None:
     own, _, remark = cell.partition("(")
     unit = own.strip("[] ") or remark.strip("[]() ")
     return None if unit.casefold() in ("", "none") else unit
+
+
+def of_rigol(
+    above: Sequence[str], names: tuple[str, ...], units: tuple[str | None, ...]
+) -> tuple[tuple[str, ...], tuple[str | None, ...], tuple[float, float] | None] | None:
+    """Names, units, and time of the first sample and step, of a table of Rigol's that has no time; None of another.
+
+    `above`: the lines above the data. The samples are counted in a column, here called `time`, or stand alone. Where
+    there is a time, its step is None.
+    """
+    if above and (newer := _NEWER_RIGOL.fullmatch(above[0])):
+        channels = newer[2].rstrip(",").split(",")
+        cells, own = [channel[:-1] for channel in channels], [channel[-1] for channel in channels]
+        told = [newer[3], newer[4]]
+        if newer[1]:
+            cells, own = ["time", *cells], ["s", *own]
+    elif len(above) > 1 and _RIGOL.fullmatch(above[0]):
+        cells, own = above[0].split(","), [cell.strip() for cell in above[1].split(",")]
+        found = cells.index("Start")
+        cells, own, told = cells[:found], own[:found], own[found : found + 2]
+        if cells[0] == "X" and own:
+            cells[0], own[0] = "time", "s"
+    else:
+        return None
+    try:
+        first, step = map(float, told)
+    except ValueError:
+        return None
+    counted = None if above[0].startswith("Time") else (first, step)
+    rest = len(cells)
+    return (
+        (*cells, *(f"column {i + 1}" for i in range(rest, len(names)))),
+        (*own, *units[rest:]),
+        counted,
+    )

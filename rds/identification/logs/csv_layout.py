@@ -23,9 +23,18 @@ from rds.identification.logs.csv_cells import (
     are_numbers,
     is_comment,
     is_number,
+    not_in_utf_8,
     split,
+    stamped,
 )
-from rds.identification.logs.csv_headings import Headings, alternates, labelled_headings, labview_units, name_and_unit
+from rds.identification.logs.csv_headings import (
+    Headings,
+    alternates,
+    labelled_headings,
+    labview_units,
+    name_and_unit,
+    of_rigol,
+)
 from rds.identification.logs.units import dimension, plain
 from rds.results.units import split_heading
 
@@ -34,9 +43,6 @@ HEAD = 1 << 16  # bytes looked at
 _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
 _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
-_RIGOL = re.compile(
-    r"X,(CH\d,)+Start,Increment,?\s*"
-)  # an oscilloscope's first line; the second has units, start, step
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,7 @@ class Layout:
     times: tuple[int, ...] = ()  # columns that hold the times of the columns after them
     ragged: bool = False  # channels end one after another, and rows with them
     clocks: frozenset[int] = frozenset()  # which of the dates are times of day alone
-    counted: tuple[float, float] | None = None  # the first column is a number of the sample: time of the first, step
+    counted: tuple[float, float] | None = None  # samples are counted, in a column `time` or by row: time of first, step
     passed: str = ""  # a line above the data that has numbers in it, too
     scaled: tuple[str, ...] = ()  # channels of which nothing tells whether their numbers are scaled
     torn: tuple[str, ...] = ()  # of columns for which the heading and the row of units say different units
@@ -93,6 +99,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     if mark == " " and labelled_headings(lines[:first], str.split) is not None:
         what = "its channels are headed by labels, and blanks stand between its cells, so that an empty one is lost"
         raise InputError(f"{what}; export it with semicolons between them (TwinCAT's scope asks for that)", str(path))
+    whole = lines
     found_heads = labelled_headings(lines[:first], lambda line: split(line, mark)) if mark != " " else None
     labelled = found_heads is not None
     surplus: tuple[str, ...] = ()
@@ -107,6 +114,10 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     if labelled:  # most rows may be shorter, as channels end one after another
         first = _below_labels(lines, first, mark, point, width)
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
+    if stamp := stamped(body[:_FEW], point):
+        what = f"a terminal's time stamp stands before each line ({stamp!r}), and its first column cannot be read; "
+        cut = f"cut {len(stamp)} characters off: `cut -c{len(stamp) + 1}- FILE > log.csv`"
+        raise InputError(f"{what}switch the stamps off there, or {cut}", str(path))
     stamps = {i: found for i in range(width) for row in body[:1] if (found := DATE.fullmatch(row[i]))}
     clocks = frozenset(i for i in range(width) for row in body[:1] if CLOCK.fullmatch(row[i]))
     dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()} | dict.fromkeys(clocks, False)
@@ -123,8 +134,9 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     numbers = [i for i in range(width) if any(is_number(row[i], point) for row in body[:_FEW])]
     passed = "" if labelled else _passed(lines[:first], mark, point, width, numbers)
     counted = None
-    if _RIGOL.fullmatch(lines[0]) and first > 1:
-        names, units, counted = _of_rigol(lines[0], lines[1], names, units)
+    if found_rigol := of_rigol([line for line in whole[:first] if line.strip()], names, units):
+        names, units, counted = found_rigol
+        surplus = ()
     return Layout(
         encoding,
         mark,
@@ -187,6 +199,11 @@ def _head(path: Path) -> tuple[list[str], str]:
     encoding = "utf-8"
     try:
         text = codecs.getincrementaldecoder("utf-8")().decode(data, whole)
+        if not whole and (line := not_in_utf_8(path)):
+            if not text.isascii():
+                what = f"it begins in UTF-8, and has bytes there that are none: {line[1][:40]!r}"
+                raise InputError(f"{what}; repair or remove the line", f"{path}, line {line[0]}")
+            encoding = "cp1252"
     except UnicodeDecodeError:
         encoding, text = "cp1252", data.decode("cp1252", errors="replace")
     if "\r" in text and "\n" not in text:
@@ -239,26 +256,14 @@ def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal:
 
 
 def _passed(above: Sequence[str], delimiter: str, decimal: str, width: int, numbers: Sequence[int]) -> str:
-    """The last line above the data that has numbers where they have, two or more; "" where none has."""
+    """The last line above the data with numbers where they have, or of numbers alone, two or more; "" for none."""
     for line in reversed(above):
         cells = split(line, delimiter)
         if len(cells) == width and len(numbers) > 1 and all(is_number(cells[i], decimal) for i in numbers):
             return line
+        if are_numbers([cell for cell in cells if cell]):
+            return line  # perhaps the first row, with a constant beside it
     return ""
-
-
-def _of_rigol(
-    head: str, below: str, names: tuple[str, ...], units: tuple[str | None, ...]
-) -> tuple[tuple[str, ...], tuple[str | None, ...], tuple[float, float] | None]:
-    """Names, units, and time of the first sample and step, of a table whose first column counts the samples."""
-    channels = [cell for cell in split(head, ",") if cell.startswith("CH")]
-    _, *own = split(below, ",")
-    try:
-        counted = float(own[len(channels)]), float(own[len(channels) + 1])
-    except (IndexError, ValueError):
-        return names, units, None
-    found = len(channels) + 1
-    return ("time", *channels, *names[found:]), ("s", *own[: len(channels)], *units[found:]), counted
 
 
 def _of_tektronix(lines: Sequence[str], encoding: str) -> Layout | None:
@@ -301,13 +306,15 @@ def _cut_heading(
     if first == 0 or delimiter == " ":
         return lines, ()
     cells = split(lines[first - 1], delimiter)
+    wider = len(cells) > width
     while cells and not cells[-1]:
         cells.pop()
     below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
     ended = bool(below) and all(row[-1] == "" for row in below)
     own, surplus = cells[: width - ended], cells[width - ended :]
     if (
-        len(cells) <= width
+        not wider
+        or len(cells) < width - ended
         or not all(own)
         or len(set(cells)) < len(cells)
         or any(is_number(cell, decimal) for cell in cells)

@@ -128,7 +128,10 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
             columns[name] = Column(name, "s" if at in layout.dates else unit, values[at])
     if layout.counted is not None:
         begin, step = layout.counted
-        columns["time"] = replace(columns["time"], values=begin + step * columns["time"].values)
+        number = columns["time"].values if "time" in columns else np.arange(rows)
+        columns = {"time": Column("time", "s", begin + step * number)} | {
+            name: column for name, column in columns.items() if name != "time"
+        }
     if layout.times:
         columns = _with_own_times(columns, layout.times)
     return Table(path, "csv", columns, findings=tuple(findings))
@@ -198,7 +201,12 @@ def _read(
     try:
         reader = arrow_csv.open_csv(
             pa.PythonFile(stream, mode="r"),
-            read_options=arrow_csv.ReadOptions(column_names=keys, block_size=_BLOCK, encoding=layout.encoding),
+            read_options=arrow_csv.ReadOptions(
+                column_names=keys,
+                block_size=_BLOCK,
+                # code page 1252 leaves five bytes undefined; only words differ, and words are shown and no more
+                encoding="latin-1" if layout.encoding == "cp1252" else layout.encoding,
+            ),
             parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter, invalid_row_handler=refuse),
             convert_options=arrow_csv.ConvertOptions(
                 column_types=types, decimal_point=layout.decimal, null_values=_NULLS

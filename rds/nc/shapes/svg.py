@@ -50,12 +50,12 @@ def read_svg(path: Path) -> Drawing:
         data = read_limited(path, _LARGEST, "an SVG drawing", "leave out embedded images")
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}; name a drawing", name) from error
-    if b"<!ENTITY" in data:
+    if b"<!ENTITY" in data.replace(b"\0", b""):  # in UTF-16, too
         raise InputError("defines entities; save it as plain SVG", name)
     try:
         root = ElementTree.fromstring(data)
-    except ElementTree.ParseError as error:
-        raise InputError(f"is no SVG: {error}; save it as plain SVG", name) from error
+    except (ElementTree.ParseError, ValueError, LookupError) as error:  # the last two: of a coding that it names
+        raise InputError(f"is no SVG: {error}; save it as plain SVG in UTF-8", name) from error
     if _tag(root) != "svg":
         raise InputError(f"is XML, but its first element is <{_tag(root)}>, not <svg>; save it as plain SVG", name)
     reader = _Reader(name, root)
