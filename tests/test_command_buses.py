@@ -32,6 +32,7 @@ def told(opened: list[dict[str, Any]]) -> set[tuple[Any, ...]]:
     "words, code",
     [
         (["estop"], 1),  # nobody is there to acknowledge it
+        (["estop", "--reset"], 1),
         (["scan"], 0),
         (["module", "4", "stop"], 2),
         (["bus", "record", "log.asc", *SECONDS], 0),

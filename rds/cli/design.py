@@ -116,9 +116,12 @@ def relay(
     """The gains that a run of the law relay found, as a table of a controller, and their margins by the run's model."""
     with refusals():
         from rds.core.atomic import keep_another, write_whole
+        from rds.core.errors import InputError
         from rds.identification.robustness.relay import RELAY, relay_gains
 
         if out is not None:
+            if out.suffix != ".toml":
+                raise InputError("the table of a controller is TOML; give it a name that ends in .toml", str(out))
             keep_another(out, RELAY, "controller of `rds design relay`")
         found = relay_gains(run, axis, delay)
         if out is not None:

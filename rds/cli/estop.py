@@ -42,8 +42,14 @@ def estop(
     if reset:
         if json:
             print_json({"reset": acted})
-        else:
-            typer.echo(f"emergency stop reset; free: {', '.join(map(str, acted)) or 'no module answers'}")
+        elif acted:
+            typer.echo(f"emergency stop reset; free: {', '.join(map(str, acted))}")
+        if not acted:
+            typer.echo(
+                f"rds: the reset was sent on {place.name}, and no module answers; check channel, power and bit rate",
+                err=True,
+            )
+            raise typer.Exit(1)
         return
     if json:
         print_json({"stopped": acted})

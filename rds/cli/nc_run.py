@@ -43,7 +43,12 @@ def run(
         ),
     ] = None,
     machine: Annotated[
-        str | None, typer.Option("--machine", help="A machine's name, or the path of its TOML file (default mini-cnc).")
+        str | None,
+        typer.Option(
+            "--machine",
+            help="A machine's name, or the path of its TOML file (default mini-cnc; with --method starmill, by moves "
+            "mrmt-oacs).",
+        ),
     ] = None,
     tools: Tools = None,
     parameters: Parameters = None,

@@ -175,6 +175,7 @@ def show_report(report: Report, files: list[Path], json: bool) -> None:
         return
     from rds.cli.console import cell, show_table
 
+    typer.echo(report.title)
     for table in report.tables:
         show_table(table.title, table.columns, [[cell(value) for value in row] for row in table.shown()], table.note)
     for sentence in report.findings:

@@ -301,6 +301,9 @@ def test_the_saved_run_gives_the_table_of_the_next_experiment(tmp_path: Path):
     assert "phase margin" in done.output
     table = tomllib.loads(out.read_text(encoding="utf-8"))["controller"]
     assert table == relay_gains(result).controller()
+    for options, said in (("--axis X", "axis 'X' of this run was not driven by"), ("-o law.py", "ends in .toml")):
+        refused = CliRunner().invoke(app, ["design", "relay", str(tmp_path / "run"), *options.split()])
+        assert refused.exit_code == 2 and said in refused.output
     as_json = CliRunner().invoke(app, ["design", "relay", str(tmp_path / "run"), "--json"])
     assert json.loads(as_json.stdout)["controller"] == table
     held = rds.Experiment(axis="Y", duration=1.0, reference=rds.sinusoid(2.0, 0.5), controller=table).run()

@@ -19,6 +19,8 @@ from waiting import wait_for
 from rds.cli.grade_run import run_alone
 from rds.core.errors import InputError
 from rds.core.parallel import Outcome
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.assignment.hand_out import hand_out
 from rds.grading.batch import run as run_module
 from rds.grading.batch.journal import Journal, read_journal
 from rds.grading.batch.outcome import BatchOutcome
@@ -366,3 +368,11 @@ def test_the_plain_command_line_needs_no_reader_of_command_lines(
     assert run_alone(words) == 0 and "graded 1 in" in capsys.readouterr().out
     assert read_journal(tmp_path / "out/journal.jsonl")[0]["grade"]["status"] == "ok"
     assert run_alone(words) == 2 and "holds a batch already" in capsys.readouterr().err
+
+
+def test_nobody_is_graded_by_the_students_copy(tmp_path: Path) -> None:
+    hand_out(read_assignment(assignment_in(tmp_path / "task", ASSIGNMENT)), tmp_path / "for-students")
+    put(tmp_path / "submitted", {"ada.py": law()})
+    with pytest.raises(InputError, match="students' copy of an assignment"):
+        run_batch(tmp_path / "for-students", tmp_path / "submitted", tmp_path / "grades")
+    assert not (tmp_path / "grades").exists()

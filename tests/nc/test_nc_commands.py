@@ -238,6 +238,14 @@ def test_bad_input_is_told_with_its_remedy(folder: Path, words: tuple[str, ...],
     assert not list(folder.glob("*.dat")) and not list(folder.glob(".*.part"))
 
 
+@pytest.mark.parametrize("name", ["canon", "time", "plot", "step", "run"])
+def test_an_experiment_or_a_controller_is_no_program_of_a_hundred_faults(folder: Path, name: str) -> None:
+    for file, what in (("own.toml", "a TOML file"), ("own.py", "a Python file")):
+        Path(file).write_text("axis = 1\n")
+        done = nc(name, file)
+        assert done.exit_code == 2 and done.stderr.startswith(f"rds: {file}: is {what}, and no part program; `rds ")
+
+
 def test_options_of_the_dialect(folder: Path) -> None:
     (folder / "oacs.ngc").write_text("P001;\nN10 G01 X0 Y0 F60;\nN20 G01 X10 A25 F60 S100;\nN30 M00;\nN40 M02;\n")
     done = nc("check", "oacs.ngc", "--machine", "mrmt-oacs", "--with", "program-numbers")

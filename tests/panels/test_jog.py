@@ -75,6 +75,7 @@ def test_an_axis_moves_while_held_and_by_step(open_page: Callable[..., Any]) -> 
         if shown:
             page.wait_for_selector(f'.rds-notice-error:has-text("{shown}")')
     page.wait_for_function("Math.abs(parseFloat(document.querySelector('.rds-jog-at').innerText) + 1.5) < 0.02")
+    assert "would leave" not in page.inner_text(".rds-main"), "what was refused before is not said of this motion"
     page.click("button.rds-stop")
     page.wait_for_selector('.rds-notice:has-text("modules are at zero volts")')
     page.wait_for_selector('button[aria-label="X plus"]:disabled')

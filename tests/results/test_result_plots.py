@@ -204,3 +204,6 @@ def test_all_that_a_picture_says_has_a_text_in_the_languages_of_the_page(name: s
         translate_picture(drawn, code)
         left = {each.get_text() for each in drawn.findobj(Text)}
         assert not said & left - set(texts(code).values())
+        drawn.set_figwidth(0.6 * drawn.get_figwidth())  # on a smaller page, where legends are made anew
+        left = {each.get_text() for each in drawn.findobj(Text)}
+        assert not said & left - set(texts(code).values())

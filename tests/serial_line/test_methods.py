@@ -258,7 +258,9 @@ def test_steps_that_noise_took_from_a_frame_are_told(tmp_path: Path) -> None:
     assert any(found["A"].astray.values()) and not any(found["C"].astray.values())
     for name, steps_off in found["A"].astray.items():
         assert found["A"].lost[name] == steps_off  # the motors made all that they got
-    said = methods_report(list(found.values()), Path("part.ngc"), {}).findings
+    report = methods_report(list(found.values()), Path("part.ngc"), {"machine": "starmill"})
+    assert report.title == "part.ngc on starmill by methods A, C"
+    said = report.findings
     assert sum("did not get" in sentence for sentence in said) == 1
     assert not any("lost by motors" in sentence for sentence in said)
 

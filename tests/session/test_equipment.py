@@ -17,6 +17,7 @@ from rds.panels.equipment.state import Equipment
 from rds.panels.kit.diagram import diagram_svg
 from rds.panels.session import Session
 from rds.panels.session.as_file import as_python, as_toml, write_toml
+from rds.panels.texts import exchanger
 
 CONTROLLER = """params = {"Kp": 20.0}
 
@@ -219,6 +220,7 @@ def test_the_diagram_shows_the_parts_of_each_mode(tmp_path: Path, kind: str, mod
     assert len({(block.row, block.column) for block in drawn.blocks}) == len(blocks)  # none over another
     assert any(link.back for link in drawn.links) == (kind == "control")
     assert all({link.start, link.end} <= blocks for link in drawn.links)
+    assert all(exchanger("de")(block.title) for block in drawn.blocks)
     svg = diagram_svg(drawn)
     assert svg.count("<rect") == len(blocks) and 'aria-label="' in svg
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import email
+import re
 from collections.abc import Iterator
 from email.policy import default
 from pathlib import Path
@@ -19,6 +20,7 @@ from rds.panels.interpolator.state import Interpolating
 from rds.panels.page.shell import Shell
 from rds.panels.scene.scene import MachineScene
 from rds.panels.session import Session
+from rds.panels.texts import exchanger
 from tests.session.test_email import Box, box
 
 __all__ = ["box"]  # a fixture
@@ -92,6 +94,9 @@ def test_the_block_diagram_has_what_takes_lines_and_arcs(tmp_path: Path) -> None
         "s-shape",
     ):
         assert said in svg(view)
+    names = {"600 mm/min", "constant-velocity", "blu 0.01", "tustin", "s-shape"}
+    for text in set(re.findall(r">([^<>]*[^\W\d_]{3}[^<>]*)<", svg(view))) - names:
+        assert exchanger("de")(text) is not None, text
     view.work.choices.set("kind", "circular")
     assert "Circular" in svg(view) and "Linear" not in svg(view)
     view.work.choices.set("arc_method", "user")

@@ -22,6 +22,7 @@ from rds.grading.sandbox.limits import Limits
 
 FILE = "assignment.toml"
 _LEAST_SECRET = 8  # characters
+COPY_SECRET = "hand-out: the plants of the grading are others"  # of the students' copy
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,8 @@ from rds.core.errors import InputError
 from rds.core.private_files import make_folder, write_private
 from rds.core.toml_file import read_toml
 from rds.core.toml_text import toml_text
-from rds.grading.assignment.assignment import FILE, Assignment, read_assignment
+from rds.grading.assignment.assignment import COPY_SECRET, FILE, Assignment, read_assignment
 
-SECRET = "hand-out: the plants of the grading are others"
 _COMMENT = """The students' copy of an assignment: visible cases and criteria only.
 Try your file with: rds grade self FOLDER FILE"""
 
@@ -93,7 +92,7 @@ def _table(assignment: Assignment) -> dict[str, Any]:
             if "requires" in entry:
                 entry["requires"] = list(criterion.requires)
             criteria.append(entry)
-    table |= {"secret": SECRET, "self_check": "visible"}
+    table |= {"secret": COPY_SECRET, "self_check": "visible"}
     if hidden or assignment.hidden.criteria:
         points = sum(criterion.max_score for criterion in hidden) + assignment.hidden.points
         table["hidden"] = {"criteria": len(hidden) + assignment.hidden.criteria, "points": points}

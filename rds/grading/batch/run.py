@@ -15,8 +15,8 @@ from rds.core.errors import InputError
 from rds.core.parallel import Outcome, Scheduler, processors, spread
 from rds.core.parallel.process import WorkerProcess
 from rds.core.parallel.spread import Progress
+from rds.grading.assignment.assignment import COPY_SECRET, Assignment, read_assignment
 from rds.grading.assignment.assignment import FILE as ASSIGNMENT
-from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.late_rules import LateRules
 from rds.grading.batch.alike import Behaviour, alike
 from rds.grading.batch.journal import FILE as JOURNAL
@@ -74,6 +74,12 @@ def run_batch(assignment: str | Path, submissions: str | Path, out: str | Path, 
 def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how: BatchOptions) -> BatchOutcome:
     """As `run_batch`, whatever was handed in comes from; it is asked for when all else is known to be in order."""
     began = time.monotonic()
+    if read.secret == COPY_SECRET:
+        raise InputError(
+            "is the students' copy of an assignment, without its hidden criteria and its secret: name the folder that "
+            "`rds grade hand-out` made it of",
+            str(read.folder),
+        )
     _check_free(out, how.resume)
     kept = out / CLASS
     place = how.class_list or (kept if kept.exists() else None)

@@ -84,8 +84,8 @@ def _gaps(time: np.ndarray, steps: np.ndarray, wide: np.ndarray, period: float, 
     )
     if gaps == "refuse":
         raise InputError(
-            f'{what}; in the map, gaps = "split" makes a log of each stretch between gaps, and "keep" says that the '
-            "command was held",
+            f'{what}; at the top of the map, gaps = "split" makes a log of each stretch between gaps, and '
+            '"keep" says that the command was held',
             where,
         )
     done = "split there" if gaps == "split" else "kept: the command is taken to have been held over them"

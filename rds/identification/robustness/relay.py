@@ -83,9 +83,9 @@ def relay_gains(run: Result | str | Path, axis: str | None = None, delay: int | 
     laws: Mapping[str, Any] = result.meta.get("controller") or {}
     having = [name for name, law in laws.items() if isinstance(law, Mapping) and _is_relay(law, result, name)]
     if not having or (axis is not None and axis not in having):
-        who = "no axis" if axis is None else f"axis {axis!r} not"
+        who = "no axis of this run was" if axis is None else f"axis {axis!r} of this run was not"
         raise InputError(
-            f"{who} of this run was driven by the law {NAME!r}"
+            f"{who} driven by the law {NAME!r}"
             + (f"; it drove {', '.join(having)}" if having else f'; run one with [controller] name = "{NAME}"')
         )
     name = having[0] if axis is None else axis

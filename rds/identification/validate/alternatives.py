@@ -32,7 +32,7 @@ def with_alternatives(candidate: Candidate, a: Assessment, verdict: Verdict, ban
     if not tried:
         return verdict
     if words:
-        said = ", ".join(f"{word} with {what}" for what, word in words.items())
+        said = ", ".join(f"it would be {str(word)!r} with {what}" for what, word in words.items())
         what = f"the verdict hangs on a choice, as a figure is near its band: {said}"
     else:
         what = f"a figure is near its band; the verdict stays the same with {', '.join(tried)}"

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 CHUNK = 1 << 18  # bytes read at once
 LONGEST = 252  # characters of a line, as in LinuxCNC
 NOT_A_FILE = "is a pipe or a device, and a program is read more than once; give a file"
+_NO_PROGRAMS = {  # by the file's ending
+    ".py": "is a Python file, and no part program; `rds check` looks at it",
+    ".toml": "is a TOML file, and no part program; `rds run` runs an experiment, `rds interpolate` takes a path",
+}
 _WINDOW = LONGEST + 4  # a block with `;` and a line break, and one character more
 
 
@@ -246,6 +250,8 @@ def not_a_file(path: str | Path) -> bool:
 def open_file(path: str | Path, name: str, *, semicolons: bool = False) -> Source:
     if not_a_file(path):
         raise ProgramError(NOT_A_FILE, file=name)
+    if other := _NO_PROGRAMS.get(os.path.splitext(path)[1].lower()):
+        raise ProgramError(other, file=name)
     try:
         stream = open(path, "rb")  # noqa: SIM115 (closed by close)
     except OSError as error:

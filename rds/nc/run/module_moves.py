@@ -352,7 +352,7 @@ def moves_report(run: MovesRun, file: Path, settings: Mapping[str, Any]) -> Repo
         said.append(f"{name} ends {off:.3g} {worst.unit} off at most, in line {worst.line}{verdict}.")
     return Report(
         kind="module-moves",
-        title=f"{file.name} by move commands",
+        title=f"{file.name} on {settings['machine']} by move commands",
         sources=[str(file)],
         settings=settings,
         tables=[table],

@@ -56,7 +56,8 @@ def methods_report(runs: Sequence[MethodRun], file: Path, settings: Mapping[str,
         said += _losses(run)
     return Report(
         kind="methods",
-        title=f"{file.name} by methods A, B and C",
+        title=f"{file.name} on {settings['machine']} by method{'s' * (len(runs) > 1)} "
+        f"{', '.join(run.method for run in runs)}",
         sources=[str(file)],
         settings=settings,
         tables=[Table("Methods", COLUMNS, rows, _NOTE, _DIGITS)],

@@ -100,10 +100,10 @@ class _Row(widgets.HBox):
         self.feed = widgets.Text(feed, placeholder="feed", tooltip=_FEED_TIP, continuous_update=False)
         away = widgets.Button(description="✕", tooltip="Remove this segment")
         away.on_click(lambda _: owner.remove(self))
-        for control, width in ((self.label, 18), (self.kind, 66), (self.turn, 152), (self.plane, 60), (self.feed, 58)):
+        for control, width in ((self.label, 14), (self.kind, 76), (self.turn, 172), (self.plane, 58), (self.feed, 58)):
             control.layout.width = f"{width}px"
         away.layout.min_width = away.layout.width = "34px"
-        self.end.layout.width, self.centre.layout.width = "108px", "132px"
+        self.end.layout.width, self.centre.layout.width = "100px", "122px"
         super().__init__([self.label, self.kind, self.end, self.centre, self.turn, self.plane, self.feed, away])
         self.add_class("rds-row")
         for control in (self.kind, self.end, self.centre, self.turn, self.plane, self.feed):

@@ -101,6 +101,7 @@ class JogView:
 
     def go(self) -> None:
         """Move the axis that is chosen to the position."""
+        self.notice.clear()  # what was refused before is over
         self.jog.go(self.jog.choices["goal_axis"], self.jog.choices["goal"])
 
     def find_home(self) -> None:
@@ -118,6 +119,7 @@ class JogView:
                     self.jog.step(name, direction)
                 else:
                     self.jog.rest()
+                self.notice.clear()  # what was refused before is over
             except RdsError as error:
                 self.notice.say(str(error), "error")
 

@@ -26,10 +26,10 @@ _TIP = "A line for each word: RF01 a link, RF02 limits, RF03 an assembly error; 
 _SCRIPT = Text("script", "Script", _TIP, longest=65536, refuse=lambda text: None)
 _REST = Choice(
     "rest",
-    "What no word says",
-    "Encoders, models, limits of planned motion, spindle and converter",
+    "Encoders, models, spindle",
+    "What a script does not say: encoders, models, limits of planned motion, spindle and converter",
     "machine",
-    {"machine": "of the machine chosen at Modules", "chosen": "chosen"},
+    {"machine": "of the machine at Modules", "chosen": "usual values"},
 )
 _EMPTY = "no script stands here yet: write one, or begin with that of the machine chosen at Modules"
 

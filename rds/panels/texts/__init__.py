@@ -56,15 +56,27 @@ def exchanger(language: str) -> Callable[[str], str | None]:
 
 
 def translate_picture(figure: Any, language: str) -> None:
-    """Exchange the texts of a matplotlib figure: titles, labels, legends. What the file does not have stays."""
+    """Exchange the texts of a matplotlib figure: titles, labels, legends. What the file does not have stays.
+
+    A `Picture` makes its legends anew with each other width: then their texts are exchanged again.
+    """
     if not language:
         return
     from matplotlib.text import Text
 
+    from rds.core.figure import Picture
+
     find = exchanger(language)
-    for each in figure.findobj(Text):
-        lines = [find(line) or line for line in each.get_text().split("\n")]
-        each.set_text(find(each.get_text()) or "\n".join(lines))
+
+    def exchange(width: float) -> None:
+        for each in figure.findobj(Text):
+            lines = [find(line) or line for line in each.get_text().split("\n")]
+            each.set_text(find(each.get_text()) or "\n".join(lines))
+
+    if isinstance(figure, Picture):
+        figure.lay_out(exchange)
+    else:
+        exchange(figure.get_figwidth())
 
 
 def _read(path: Path) -> dict[str, Any]:
