@@ -182,7 +182,7 @@ def ends_as_ctrl_c() -> Iterator[None]:
     """A polite kill and a closed terminal end what runs here as Ctrl-C does, so that its clean-up is done."""
 
     def interrupt(number: int, _: object) -> None:
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt(signal.Signals(number).name)
 
     numbers = [number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None]
     # what is ignored (nohup) stays so

@@ -353,7 +353,13 @@ def main() -> None:
     program = sys.argv[1:3] == ["nc", "run"] and not sys.stdin.isatty()
     if own or (sys.argv[1:2] in (["run"], ["robustness"]) and not asks) or program:
         guarded(_app)
-    _app()
+    try:
+        _app()
+    except SystemExit as end:
+        interrupt = getattr(end.__context__, "__cause__", None)  # typer makes a silent exit of it
+        if isinstance(interrupt, KeyboardInterrupt):
+            typer.echo(f"rds: stopped by {interrupt.args[0] if interrupt.args else 'Ctrl-C'}", err=True)
+        raise
 
 
 def _app() -> int:

@@ -57,6 +57,7 @@ def _moving(context: typer.Context, place: Place) -> Iterator[Any]:
             yield module
         except KeyboardInterrupt:
             module.stop()
+            typer.echo("rds: the module was told to stop where it is", err=True)
             raise
 
 

@@ -139,7 +139,9 @@ def test_what_ends_the_command_ends_the_motion(
         process.send_signal(number)
         hear(bus, lambda message: message.arbitration_id == 4 and message.data[:2] == b"\x03\x00")
         _, said = process.communicate(timeout=60)
-    assert process.returncode != 0 and b"Traceback" not in said
+    by = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
+    assert process.returncode != 0
+    assert said.decode() == f"rds: the module was told to stop where it is\nrds: stopped by {by}\n"
 
 
 def hear(bus: can.BusABC, wanted: Callable[[can.Message], bool]) -> can.Message:
