@@ -386,6 +386,34 @@ def control(t, r, y, state, params):
     assert "answered otherwise while it was counted" in found.refused
 
 
+def test_what_runs_when_garbage_is_collected_is_counted(pool: Pool, written: Written) -> None:
+    """The count looks at each new function, which takes memory; a collection then would be within the count itself."""
+    text = """
+import gc
+kept, done = [], [0]
+def pause(): pass
+def collected(phase, info):
+    gc.disable()
+    gc.callbacks.clear()
+    for n in range(300): total = n
+    done[0] += 1
+initial_state = ()
+def control(t, r, y, state, params):
+    gc.collect()
+    pause.__code__ = pause.__code__.replace(co_firstlineno=len(kept) + 1)
+    kept.append(pause.__code__)
+    gc.set_threshold(1)
+    gc.callbacks.append(collected)
+    gc.enable()
+    pause()
+    if done[0] < len(kept): collected("stop", {})
+    gc.set_threshold(100000)
+    return 1.0, state
+"""
+    found = counts(pool, written(text, ""), samples=10)
+    assert (found.events or 0) > 10 * 300, found
+
+
 def test_who_takes_away_what_is_not_seen_is_counted_all_the_same(pool: Pool, written: Written) -> None:
     """As doctest does, which puts back what `sys.gettrace` has said."""
     plain = WORK.replace("ROUNDS", "10")
