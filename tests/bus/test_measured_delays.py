@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from rds.bus.analysis.analysis_plot import plot
 from rds.bus.analysis.analysis_report import Analysis, analyse, analyse_messages
-from rds.bus.analysis.measured import Measured, of_frames
+from rds.bus.analysis.measured import Measured, measured, of_frames
 from rds.bus.analysis.messages import Message, in_order
 from rds.bus.analysis.schedule import Slot, occupied, schedule
 from rds.bus.medium.bits import frame_bits
@@ -247,6 +247,19 @@ def test_logs_of_something_else_are_refused() -> None:
 def test_a_log_of_answers_alone_has_no_delays() -> None:
     said = str(of_frames(cnc(), [frame(0x022, k * 1e-3) for k in range(3)]))
     assert "no message of the log has a delay that can be measured" in said
+
+
+def test_frames_of_one_instant_have_no_delays() -> None:
+    found = of_frames(cnc(), [frame(0x010, 5.0) for _ in range(30)])
+    assert found.row("command").extra == 29
+
+
+def test_a_log_whose_clock_was_set_back_is_refused(tmp_path: Path) -> None:
+    stamps = [0.1 * k for k in range(20)]
+    lines = [f"({1000.0 + stamp:.6f}) can0 010#0011223344556677\n" for stamp in [*stamps, *stamps[10:]]]
+    (tmp_path / "run.log").write_text("".join(lines))
+    with pytest.raises(InputError, match=r"go back by 0\.9 s at frame 21, to 1001\.000000 s"):
+        measured(cnc(), tmp_path / "run.log")
 
 
 def test_drives_are_measured_by_their_sync() -> None:
