@@ -243,6 +243,17 @@ name = Name()
         "before = done[0]; sys.audit('object.__getattr__', None, name)\n"
         "    if done[0] > before: return min(abs(r.position - y), 1.0), state",
     ),
+    "a module whose name works when it is told": (
+        """
+class Name(str):
+    def __format__(self, spec):
+        work()
+        return "x"
+name = Name("_testcapi")
+""",
+        "before = done[0]\n    try: sys.audit('import', name)\n    except RuntimeError: pass\n"
+        "    if done[0] > before: return min(abs(r.position - y), 1.0), state",
+    ),
     "a handler that interrupts the count": (
         """
 import signal

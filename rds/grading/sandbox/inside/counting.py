@@ -60,6 +60,7 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     set_handler, is_function = _signal.signal, callable
     collect, collects = gc.collect, gc.isenabled()
     starts, last_part, exactly, length, call_tracing = str.startswith, str.rpartition, type, len, sys.call_tracing
+    plain = str.__str__  # of a text of a class of its own, without the methods of that class
     read, write, identity, as_float, refusal = os.read, os.write, id, float, RuntimeError
     unpack, pack, asked, answered = layout.question.unpack, layout.answer.pack, layout.question.size, layout.answer.size
     padding = [0.0] * (layout.answers - 1)
@@ -120,7 +121,7 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
         is_frame = event == "object.__getattr__" and exactly(args[1]) is text and args[1] in _frames
         is_inner = event == "import" and starts(last_part(args[0], ".")[2], _inner)
         if is_frame or is_inner or event in _never or event.startswith(_begins):
-            raise refusal(f"{args[1] if is_frame else args[0] if is_inner else event} {_said}")
+            raise refusal(f"{args[1] if is_frame else plain(args[0]) if is_inner else event} {_said}")
 
     _never, _begins, _frames, _inner = _NEVER, _NEVER_BEGINS, _FRAMES, _NO_MODULES
     _said = "is not allowed in a run whose work is counted"
