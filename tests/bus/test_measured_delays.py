@@ -225,6 +225,12 @@ def test_stamps_that_no_wire_can_make_are_said() -> None:
     assert "No frame is closer to the one before than the wire allows" in str(of_frames(cnc(), cycles(cnc())))
 
 
+def test_pauses_between_frames_are_no_other_bit_rate() -> None:
+    log = [frame(0x010 if k % 4 == 0 else 0x021 + k % 4, (k // 4) * 4e-3 + (k % 4) * 135e-6) for k in range(400)]
+    said = str(of_frames(cnc(), log))
+    assert "not at 1000: the sender leaves pauses, or the stamps are not those of the wire" in said
+
+
 def test_errors_longer_frames_and_silent_modules_are_said() -> None:
     log = [message for message in cycles(cnc()) if message.arbitration_id != 0x024]
     log.append(can.Message(timestamp=EPOCH + 0.1, is_error_frame=True))
