@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from rds.bus.analysis.analysis_plot import plot
 from rds.bus.analysis.analysis_report import Analysis, analyse, analyse_messages
-from rds.bus.analysis.measured import Measured, of_frames
+from rds.bus.analysis.measured import Measured, measured, of_frames
 from rds.bus.analysis.messages import Message, in_order
 from rds.bus.analysis.schedule import Slot, occupied, schedule
 from rds.bus.medium.bits import frame_bits
@@ -225,6 +225,12 @@ def test_stamps_that_no_wire_can_make_are_said() -> None:
     assert "No frame is closer to the one before than the wire allows" in str(of_frames(cnc(), cycles(cnc())))
 
 
+def test_pauses_between_frames_are_no_other_bit_rate() -> None:
+    log = [frame(0x010 if k % 4 == 0 else 0x021 + k % 4, (k // 4) * 4e-3 + (k % 4) * 135e-6) for k in range(400)]
+    said = str(of_frames(cnc(), log))
+    assert "not at 1000: the sender leaves pauses, or the stamps are not those of the wire" in said
+
+
 def test_errors_longer_frames_and_silent_modules_are_said() -> None:
     log = [message for message in cycles(cnc()) if message.arbitration_id != 0x024]
     log.append(can.Message(timestamp=EPOCH + 0.1, is_error_frame=True))
@@ -247,6 +253,19 @@ def test_logs_of_something_else_are_refused() -> None:
 def test_a_log_of_answers_alone_has_no_delays() -> None:
     said = str(of_frames(cnc(), [frame(0x022, k * 1e-3) for k in range(3)]))
     assert "no message of the log has a delay that can be measured" in said
+
+
+def test_frames_of_one_instant_have_no_delays() -> None:
+    found = of_frames(cnc(), [frame(0x010, 5.0) for _ in range(30)])
+    assert found.row("command").extra == 29
+
+
+def test_a_log_whose_clock_was_set_back_is_refused(tmp_path: Path) -> None:
+    stamps = [0.1 * k for k in range(20)]
+    lines = [f"({1000.0 + stamp:.6f}) can0 010#0011223344556677\n" for stamp in [*stamps, *stamps[10:]]]
+    (tmp_path / "run.log").write_text("".join(lines))
+    with pytest.raises(InputError, match=r"go back by 0\.9 s at frame 21, to 1001\.000000 s"):
+        measured(cnc(), tmp_path / "run.log")
 
 
 def test_drives_are_measured_by_their_sync() -> None:

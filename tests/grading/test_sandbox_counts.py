@@ -243,6 +243,17 @@ name = Name()
         "before = done[0]; sys.audit('object.__getattr__', None, name)\n"
         "    if done[0] > before: return min(abs(r.position - y), 1.0), state",
     ),
+    "a module whose name works when it is told": (
+        """
+class Name(str):
+    def __format__(self, spec):
+        work()
+        return "x"
+name = Name("_testcapi")
+""",
+        "before = done[0]\n    try: sys.audit('import', name)\n    except RuntimeError: pass\n"
+        "    if done[0] > before: return min(abs(r.position - y), 1.0), state",
+    ),
     "a handler that interrupts the count": (
         """
 import signal
@@ -384,6 +395,34 @@ def control(t, r, y, state, params):
 """
     found = counts(pool, written(text, ""), samples=1)
     assert "answered otherwise while it was counted" in found.refused
+
+
+def test_what_runs_when_garbage_is_collected_is_counted(pool: Pool, written: Written) -> None:
+    """The count looks at each new function, which takes memory; a collection then would be within the count itself."""
+    text = """
+import gc
+kept, done = [], [0]
+def pause(): pass
+def collected(phase, info):
+    gc.disable()
+    gc.callbacks.clear()
+    for n in range(300): total = n
+    done[0] += 1
+initial_state = ()
+def control(t, r, y, state, params):
+    gc.collect()
+    pause.__code__ = pause.__code__.replace(co_firstlineno=len(kept) + 1)
+    kept.append(pause.__code__)
+    gc.set_threshold(1)
+    gc.callbacks.append(collected)
+    gc.enable()
+    pause()
+    if done[0] < len(kept): collected("stop", {})
+    gc.set_threshold(100000)
+    return 1.0, state
+"""
+    found = counts(pool, written(text, ""), samples=10)
+    assert (found.events or 0) > 10 * 300, found
 
 
 def test_who_takes_away_what_is_not_seen_is_counted_all_the_same(pool: Pool, written: Written) -> None:

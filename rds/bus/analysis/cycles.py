@@ -157,7 +157,7 @@ def _out_of_turn(starts: np.ndarray, cycles: np.ndarray, period: float) -> np.nd
     Without them the instants are later, and the delays shorter.
     """
     beside = np.zeros(len(starts), bool)
-    if len(starts) < _ENOUGH:
+    if len(starts) < _ENOUGH or not np.ptp(cycles):
         return beside
     slope, _ = np.polyfit(cycles, starts, 1)
     phases = starts - slope * cycles

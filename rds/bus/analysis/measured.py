@@ -7,7 +7,7 @@ the bound says that the schedule which was analysed is not that of the bus.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf, isfinite
 from pathlib import Path
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 _TOLERANCE = 2.0 * RESOLUTION  # a delay is the difference of two times
 _DENSE, _ALIKE = 0.01, 0.03  # share of the frames that tell the bit rate; they agree to that
 _FEW = 20  # frames
+_SET_BACK = 0.05  # s: by less, adapters deliver frames out of their order
 
 
 class During(NamedTuple):
@@ -143,18 +144,26 @@ class Measured:
 def measured(analysis: Analysis, path: str | Path) -> Measured:
     """The delays in the log `path`, of any format that is read, against the bounds of `analysis`.
 
-    InputError for a log that cannot be read, without a frame of the schedule, or of several buses.
+    InputError for a log that cannot be read, of several buses, without a frame of the schedule, whose time goes back.
     """
     from rds.bus.tools.logs import LogFile
 
     path = Path(path)
     if path.is_dir():
-        raise InputError(
-            "it is a folder, and --measured takes a bus log: a saved run keeps no frames; "
-            "record them while it runs (`rds bus record run.log`)",
-            str(path),
-        )
-    return of_frames(analysis, LogFile(path), str(path))
+        said = "it is a folder, and --measured takes a bus log: a saved run keeps no frames; record them while it runs"
+        raise InputError(f"{said} (`rds bus record run.log`)", str(path))
+    return of_frames(analysis, _forward(LogFile(path), path), str(path))
+
+
+def _forward(frames: Iterable[can.Message], path: Path) -> Iterator[can.Message]:
+    """The frames of a log; InputError where its clock was set back, as two times of the bus would be mixed."""
+    latest = -inf
+    for number, frame in enumerate(frames, 1):
+        latest = max(latest, frame.timestamp)
+        if (back := latest - frame.timestamp) > _SET_BACK:
+            said = f"its time stamps go back by {back:.6g} s at frame {number}, to {frame.timestamp:.6f} s"
+            raise InputError(f"{said}: its clock was set, or two logs were joined; keep one part of it", str(path))
+        yield frame
 
 
 def of_frames(analysis: Analysis, frames: Iterable[can.Message], path: str = "log") -> Measured:

@@ -156,9 +156,10 @@ def _evidence(measured: Measured) -> list[str]:
     rate, assumed = measured.wire.bitrate, measured.analysis.bitrate
     if rate is not None and abs(rate / assumed - 1.0) > _OTHER_RATE:
         near = min(_BITRATES, key=lambda each: abs(each / rate - 1.0))
+        other = "the sender leaves pauses" if near == assumed else f"try --bitrate {near}"
         said.append(
             f"Bit rate: the closest frames follow each other as at about {rate / 1e3:.0f} kbit/s, not at "
-            f"{assumed / 1e3:g}: try --bitrate {near}, or the stamps are not those of the wire."
+            f"{assumed / 1e3:g}: {other}, or the stamps are not those of the wire."
         )
     for row in measured.rows:
         if row.log_period is not None and abs(row.log_period / row.period - 1.0) > OTHER_PERIOD:

@@ -58,8 +58,9 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     settrace, setprofile, gettrace, getprofile = sys.settrace, sys.setprofile, sys.gettrace, sys.getprofile
     getframe, create, attributes, as_int, text = sys._getframe, _imp.create_builtin, SimpleNamespace, int, str
     set_handler, is_function = _signal.signal, callable
-    collects, keep_all, collect_again = gc.isenabled, gc.disable, gc.enable
+    collect, collects = gc.collect, gc.isenabled()
     starts, last_part, exactly, length, call_tracing = str.startswith, str.rpartition, type, len, sys.call_tracing
+    plain = str.__str__  # of a text of a class of its own, without the methods of that class
     read, write, identity, as_float, refusal = os.read, os.write, id, float, RuntimeError
     unpack, pack, asked, answered = layout.question.unpack, layout.answer.pack, layout.question.size, layout.answer.size
     padding = [0.0] * (layout.answers - 1)
@@ -120,7 +121,7 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
         is_frame = event == "object.__getattr__" and exactly(args[1]) is text and args[1] in _frames
         is_inner = event == "import" and starts(last_part(args[0], ".")[2], _inner)
         if is_frame or is_inner or event in _never or event.startswith(_begins):
-            raise refusal(f"{args[1] if is_frame else args[0] if is_inner else event} {_said}")
+            raise refusal(f"{args[1] if is_frame else plain(args[0]) if is_inner else event} {_said}")
 
     _never, _begins, _frames, _inner = _NEVER, _NEVER_BEGINS, _FRAMES, _NO_MODULES
     _said = "is not allowed in a run whose work is counted"
@@ -160,15 +161,11 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
         def interrupt(number: int) -> None:
             nonlocal may_trace
             if secret is not None:
-                had = collects()
-                keep_all()  # or a finalizer would run while one thing is allowed
-                may_trace = True
+                may_trace = True  # no finalizer runs meanwhile: garbage is collected between questions only
                 try:
                     settrace(tracing)  # Python 3.11 needs it beside `call_tracing`
                 finally:
                     may_trace = False
-                    if had:
-                        collect_again()
             handler(number, None)
 
         if is_function(handler):
@@ -180,7 +177,13 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
         if not runs:  # who begins again would take away what was counted
             before, runs = events, True
 
+    def set_collects(value: bool) -> None:
+        nonlocal collects
+        collects = value
+
     def receive() -> tuple[Any, ...]:
+        if collects:
+            collect(0)
         data = read(questions, asked)
         while len(data) != asked:
             part = read(questions, asked - len(data))
@@ -218,6 +221,11 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     sys.gettrace = sys.getprofile = lambda: None  # it looks like a run that is not counted
     sys.settrace, sys.setprofile = quiet(settrace), quiet(setprofile)
     sys._getframe, _imp.create_builtin, _signal.signal = _hidden(look), _hidden(create_new), _hidden(handle)
+    # Collected by itself, garbage would have its finalizers, and `gc.callbacks`, run within the trace function, where
+    # nothing is counted.
+    gc.disable()
+    gc.enable, gc.disable = _hidden(lambda: set_collects(True)), _hidden(lambda: set_collects(False))
+    gc.isenabled = _hidden(lambda: collects)
     sys.addaudithook(guard)
     is_open = True
     getframe().f_trace_opcodes = True  # from Python 3.12 on, none has it that is traced before the first one does
