@@ -49,7 +49,7 @@ def test_a_host_that_dies_with_all_its_processes(bench: Bench, tmp_path: Path) -
     assert f"the part program was in line {LINE}" in left.meta["notes"][-1]
     assert left["program_sample"][-1] > 0.0
     assert np.isfinite(left["X_measured"]).all()
-    for name in ("ring", "live_values"):
+    for name in ("live", "ring"):
         # the next run on this computer removes them, and may have done so by now
         Path(processes["live_values"]).with_suffix(f".{name}").unlink(missing_ok=True)
 
