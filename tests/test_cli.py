@@ -146,6 +146,8 @@ BAD_INPUT = [
     (["run", "part.ngc"], "part.ngc: it is a part program: `rds nc run` runs it"),
     (["run", "e.toml", "--out", "law.py"], "law.py"),
     (["run", "e.toml", "-m", "emulation", "--out", "law.py"], "law.py: is a file, not a folder"),
+    (["check", "log.csv"], "log.csv: it is no Python file; `rds data describe` looks at a log"),
+    (["data", "describe", "e.toml"], "`rds validate` takes the model first, then logs"),
     (["check", "gone.py"], "gone.py: there is no such file"),
     (["check", "e.toml"], "it looks like an experiment, which `rds run` takes"),
     (["check", "law.py", "--sample-period", "0"], "must be from 1e-06 to 1000 s"),

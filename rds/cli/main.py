@@ -196,6 +196,14 @@ def run(
     raise typer.Exit(exit_code(result))
 
 
+_CHECKED_BY = {
+    **dict.fromkeys((".ngc", ".nc", ".tap", ".gcode"), "`rds nc check` looks at a part program"),
+    **dict.fromkeys((".csv", ".tsv", ".mat", ".parquet", ".mf4"), "`rds data describe` looks at a log"),
+    **dict.fromkeys((".dxf", ".svg"), "`rds nc make` looks at a drawing"),
+    ".ncc": "`rds machine new` reads a configuration script",
+}
+
+
 @app.command()
 def check(
     file: Annotated[
@@ -217,7 +225,6 @@ def check(
         machines.check_machine(file, json, axes)
     with refusals(), stdout_kept(json):
         if file.suffix == ".toml":
-            from rds.core.errors import InputError
             from rds.identification.fit.run_model import check_model_file
 
             if axes is not None:
@@ -226,6 +233,8 @@ def check(
         else:
             from rds.checks import check_file
 
+            if other := _CHECKED_BY.get(file.suffix.lower()):  # it would be run as Python
+                raise InputError(f"it is no Python file; {other}", str(file))
             report = check_file(file, sample_period, coupled=axes is not None, axes=axes or 2)
     if json:
         print_json(report.to_json())

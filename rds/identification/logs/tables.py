@@ -21,6 +21,7 @@ TEXTS = (".csv", ".txt", ".dat", ".tsv", ".prn", ".lvm")
 MEASUREMENTS = (".mf4", ".mdf", ".dat")  # of which some are text, and some bus logs
 # what of other programs is not read, and which export of theirs is
 _EXPORTS = {
+    ".toml": "a model, a map or an experiment, and no log: `rds validate` takes the model first, then logs",
     ".tdms": "NI's TDMS: in LabVIEW write the channels by `Write To Measurement File` as text (LVM); or in Python "
     "`nptdms.TdmsFile.read(FILE).as_dataframe(time_index=True).to_csv('log.csv', index_label='time [s]')`",
     **dict.fromkeys(

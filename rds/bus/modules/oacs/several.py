@@ -195,7 +195,7 @@ class Several:
             _, result, counts = self._answer({number}, answers, asked + PATIENCE)
             if result is None:
                 self._fail(number, f"was told {what} and did not answer within {PATIENCE:g} s; see to its power and "
-                           "cable (`rds scan` shows who is there)")  # fmt: skip
+                           "cable (`rds scan` shows who is there, and what they speak)")  # fmt: skip
             elif result > Result.ACCEPTED:
                 self._fail(number, f"refused {what}: {reason(result)}")
         return Arrived(counts, self.port.now() - asked)
