@@ -13,7 +13,7 @@ import types
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +41,8 @@ class StudentFile:
     declares none. One `params` and one `initial_state` serve every function of a file; a model and a controller whose
     states differ belong in two files. `misfits` are functions that have the name but not the arguments of an interface,
     such as a helper called `interpolate`, with the reason. `starts_with_none` is set where `initial_state = None` is
-    written: its controller is given None at first, and not the empty state.
+    written: its controller is given None at first, and not the empty state. `sample_period` is what a file sets it to
+    (s), if that is a number: the period that its own numbers were made for.
     """
 
     source: Source
@@ -51,6 +52,7 @@ class StudentFile:
     signals: Mapping[str, str] = field(default_factory=dict)
     misfits: Mapping[str, str] = field(default_factory=dict)
     starts_with_none: bool = False
+    sample_period: float | None = None
 
     @property
     def first_state(self) -> Any:
@@ -81,7 +83,8 @@ class StudentFile:
         if self.initial_state is None and not self.starts_with_none and not coupled:
             _needs_no_state(control, merged, self.source)
         state = own_copy(self.first_state, "initial_state", where)
-        return Controller(control, state, merged, self.source, coupled, signals=dict(self.signals))
+        signals, period = dict(self.signals), self.sample_period
+        return Controller(control, state, merged, self.source, coupled, signals=signals, sample_period=period)
 
 
 def load_student(path: str | Path, validate: bool = True, limit: bool = True) -> StudentFile:
@@ -100,7 +103,10 @@ def load_student(path: str | Path, validate: bool = True, limit: bool = True) ->
     source = Source(file.name, str(file), hashlib.sha256(data).hexdigest(), text)
     with limited() if limit else nullcontext():
         variables = _run(text, file)
-    return _student(variables, source, validate)
+    student, period = _student(variables, source, validate), variables.get("sample_period")
+    if isinstance(period, int | float) and not isinstance(period, bool):
+        return replace(student, sample_period=float(period))
+    return student
 
 
 def from_namespace(namespace: Mapping[str, Any] | types.ModuleType, validate: bool = True) -> StudentFile:

@@ -83,6 +83,7 @@ class Controller:
     `retune`, any number in `params` may be changed and is handed to `control` as it is.
     One that is not `repeatable` answers differently when a run is gone through again, such as a person's loop.
     `conclude(axis, unit, its recorded signals by name, params)` gives a sentence for the notes of the run.
+    `sample_period` is the one that its numbers were made for, s, where it says so: a run of another one tells it.
     """
 
     control: Callable[..., Any]
@@ -96,6 +97,7 @@ class Controller:
     observe: Callable[..., Sequence[float]] | None = None
     repeatable: bool = True
     conclude: Callable[..., str] | None = None
+    sample_period: float | None = None
 
     def __repr__(self) -> str:
         return _named(self)

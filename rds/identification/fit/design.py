@@ -163,6 +163,8 @@ _FILE = '''\
 For a loop sampled every {period!r} s: the observer's numbers hold for no other period.
 {not_in_it}"""
 
+sample_period = {period!r}  # s; a run of another one says so
+
 params = {{
     "inertia": {inertia!r},  # V/(mm/s^2): tau / K
     "inverse_gain": {inverse_gain!r},  # V/(mm/s): 1 / K

@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
+from math import isclose
 from typing import Any
 
 import numpy as np
@@ -42,12 +43,23 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     if mode.followed and plan.controlled and plan.repeatable:
         columns |= _simulated(plan, rows, sample)
     meta = _description(plan, rows) | known
-    meta["notes"] += _beyond_travel(plan, columns) + _concluded(plan, columns)
+    meta["notes"] += _of_another_period(plan) + _beyond_travel(plan, columns) + _concluded(plan, columns)
     if mode.real_time:
         meta |= _judged(plan, rows, sample)
         if note := bus_note(meta["drivers"], meta["bus"]):
             meta["notes"].append(note)
     return Result(columns, units, meta)
+
+
+def _of_another_period(plan: Plan) -> list[str]:
+    """A sentence for each file of a law that was made for another sample period."""
+    laws = {law.source.name: law for part in plan.axes if (law := part.controller) is not None}
+    return [
+        f"{name} says that it is made for a sample period of {law.sample_period:g} s, and the run has {plan.T:g} s; "
+        "design it for that, or run it with its own"
+        for name, law in laws.items()
+        if law.sample_period is not None and not isclose(law.sample_period, plan.T)
+    ]
 
 
 def _beyond_travel(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
