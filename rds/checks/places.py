@@ -26,6 +26,8 @@ def remembered(function: Callable[..., Any]) -> dict[str, Any]:
         try:
             found[place] = copy.deepcopy(value)
         except Exception:
+            if type(value).__module__ == "itertools":  # from Python 3.14 on, whose text tells where it is: `count(5)`
+                found[place] = repr(value)
             continue  # generators, open files and locks have no copy
     return found
 

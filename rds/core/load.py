@@ -7,6 +7,7 @@ import copy
 import hashlib
 import inspect
 import io
+import re
 import sys
 import tokenize
 import types
@@ -30,6 +31,7 @@ __all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "st
 
 STUDENT_MODULE = "rds_student_"  # how the names of modules begin that a student's file was loaded as
 _PYTHON = f"Python {sys.version_info.major}.{sys.version_info.minor}"
+_DECLARES = re.compile(rb"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")  # the encoding of a file of Python, PEP 263
 _LARGEST = 10_000_000  # bytes; a file of data, not of code
 
 
@@ -285,6 +287,7 @@ def _decode(data: bytes, file: Path) -> str:
     if b"\0" in data:
         line = data[: data.index(b"\0")].count(b"\n") + 1
         raise InputError("it contains null bytes, so it is not UTF-8 text; save it as UTF-8", f"{file}:{line}")
+    encoding = ""
     try:
         try:
             encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
@@ -296,8 +299,9 @@ def _decode(data: bytes, file: Path) -> str:
             line = data[: error.start].count(b"\n") + 1
             bad = data[error.start : error.start + 1]
             raise InputError(f"byte {bad!r} is not UTF-8 text; save it as UTF-8", f"{file}:{line}") from error
+        declared = next((found[1] for line in data.splitlines()[:2] if (found := _DECLARES.match(line))), b"")
         raise InputError(
-            f"its text cannot be read as the {encoding!r} that it declares; save it as UTF-8", str(file)
+            f"its text cannot be read as the {declared.decode()!r} that it declares; save it as UTF-8", str(file)
         ) from error
 
 
