@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import codecs
 import copy
 import hashlib
 import inspect
@@ -13,7 +14,7 @@ import tokenize
 import types
 import uuid
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -287,21 +288,22 @@ def _decode(data: bytes, file: Path) -> str:
     if b"\0" in data:
         line = data[: data.index(b"\0")].count(b"\n") + 1
         raise InputError("it contains null bytes, so it is not UTF-8 text; save it as UTF-8", f"{file}:{line}")
-    encoding = ""
+    declared = next((found[1].decode() for line in data.splitlines()[:2] if (found := _DECLARES.match(line))), "")
+    encoding = "utf-8-sig"
     try:
         try:
             encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
-        except SyntaxError:  # no encoding that Python knows is declared, and the first lines are not UTF-8
-            encoding = "utf-8-sig"
+        except SyntaxError:  # a line is not in what is declared, or no encoding that Python knows is
+            with suppress(LookupError):
+                encoding = codecs.lookup(declared or encoding).name
         return data.decode(encoding)
     except (LookupError, UnicodeError) as error:  # Python knows it, but not as an encoding of text, or not of this one
         if isinstance(error, UnicodeDecodeError) and encoding.startswith("utf-8"):
             line = data[: error.start].count(b"\n") + 1
             bad = data[error.start : error.start + 1]
             raise InputError(f"byte {bad!r} is not UTF-8 text; save it as UTF-8", f"{file}:{line}") from error
-        declared = next((found[1] for line in data.splitlines()[:2] if (found := _DECLARES.match(line))), b"")
         raise InputError(
-            f"its text cannot be read as the {declared.decode()!r} that it declares; save it as UTF-8", str(file)
+            f"its text cannot be read as the {declared!r} that it declares; save it as UTF-8", str(file)
         ) from error
 
 
