@@ -33,6 +33,7 @@ __all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "st
 STUDENT_MODULE = "rds_student_"  # how the names of modules begin that a student's file was loaded as
 _PYTHON = f"Python {sys.version_info.major}.{sys.version_info.minor}"
 _DECLARES = re.compile(rb"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")  # the encoding of a file of Python, PEP 263
+_NUMBERS = (int, float)
 _LARGEST = 10_000_000  # bytes; a file of data, not of code
 
 
@@ -107,9 +108,8 @@ def load_student(path: str | Path, validate: bool = True, limit: bool = True) ->
     with limited() if limit else nullcontext():
         variables = _run(text, file)
     student, period = _student(variables, source, validate), variables.get("sample_period")
-    if isinstance(period, int | float) and not isinstance(period, bool):
-        return replace(student, sample_period=float(period))
-    return student
+    # by its type as it was before the file ran, which may have put another `float` in place of Python's
+    return replace(student, sample_period=1.0 * period) if type(period) in _NUMBERS else student
 
 
 def from_namespace(namespace: Mapping[str, Any] | types.ModuleType, validate: bool = True) -> StudentFile:
