@@ -109,7 +109,7 @@ def load_student(path: str | Path, validate: bool = True, limit: bool = True) ->
         variables = _run(text, file)
     student, period = _student(variables, source, validate), variables.get("sample_period")
     # by its type as it was before the file ran, which may have put another `float` in place of Python's
-    return replace(student, sample_period=1.0 * period) if type(period) in _NUMBERS else student
+    return replace(student, sample_period=period) if period is not None and type(period) in _NUMBERS else student
 
 
 def from_namespace(namespace: Mapping[str, Any] | types.ModuleType, validate: bool = True) -> StudentFile:
