@@ -387,7 +387,7 @@ def test_signals_by_chance_are_found():
 def test_one_broken_clause_is_one_fault():
     """What follows from a fault is not reported as further ones."""
     for bad in (global_memory, chance, voltage_alone, text, grows, changes_state, exits):
-        assert len(check_controller(bad, initial_state=[0.0]).faults) == 1, bad.__name__
+        assert len(check_controller(bad, initial_state=[0.0], budget=0.5).faults) == 1, bad.__name__
 
 
 def test_missing_initial_state_is_named():

@@ -245,6 +245,13 @@ def test_a_tool_is_changed_when_the_spindle_stands() -> None:
     assert (np.diff(ran.position[stops], axis=0) == 0.0).all()
 
 
+def test_the_last_sample_tells_the_spindle_to_stop() -> None:
+    """The end of a record, and the page, said 2000 rev/min of a program that ends with M5."""
+    ran = execute(prepared(PATH, Event(-1, "spindle", 2000.0, 5), Event(len(PATH) - 1, "spindle", 0.0, 98)))
+    assert ran.ending is Ending.DONE and ran.speed[-1] == 0.0
+    assert (ran.speed[2:-1] == 2000.0).all()
+
+
 def test_a_spindle_that_never_gets_there_is_told() -> None:
     program = prepared(PATH, Event(-1, "spindle", -2000.0, 5))
     ran = execute(program, speed=lambda k, wanted: 0.5 * wanted)

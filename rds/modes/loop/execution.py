@@ -353,6 +353,8 @@ class Execution:
             self._references[-1].position.value = self._speed
 
     def _end(self, ending: Ending, reason: str) -> None:
+        if self._spindle_axis is not None:
+            self._references[-1].position.value = self._speed  # a program's last M5 acts at its last sample
         self.ending = (ending, reason)
         self.state = State.OVER
 
