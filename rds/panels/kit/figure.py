@@ -42,6 +42,7 @@ class FigureView(widgets.VBox):
         self._room: _Room | None = None
         self.figure: Any = None
         self._waiting: Any = None
+        self._drawing: Html | None = None  # what is shown meanwhile
         self._shown: list[widgets.Widget] = []  # closed when something else is: a kernel keeps every open widget
 
     def show(self, figure: Any, session: Session, caption: str = "") -> None:
@@ -71,7 +72,9 @@ class FigureView(widgets.VBox):
         `then()` is called once it is there.
         """
         self.clear()
-        self._put(Html('<p role="status">drawing …</p>'))
+        # it stays, too: one that is closed a moment later is no widget any more when a busy page comes to show it
+        self._drawing = self._drawing or Html('<p role="status">drawing …</p>')
+        self.children = [*self.children, self._drawing]
         task = self._waiting = session.work("a plot", lambda task: make())
 
         def look() -> None:

@@ -35,9 +35,11 @@ def status_html(status: Status | None, modes: Mapping[int, Modes], machine: Mach
 def at_the_end(status: Status, result: Result) -> Status:
     """Where a run came to its end, by its last row; `status` is any of before."""
     measured = {name: float(result[f"{name}_measured"][-1]) for name in status.measured}
+    reference = {name: float(result[f"{name}_reference"][-1]) for name in status.reference}
     line, time = int(result["program_line"][-1]), float(result["time"][-1])
     share = 1.0 if result.meta.get("ending") == Ending.DONE else status.share
-    return replace(status, time=time, line=line, state=State.OVER, feed=0.0, share=share, measured=measured, to_go={})
+    ended = replace(status, time=time, line=line, state=State.OVER, feed=0.0, share=share, to_go={})
+    return replace(ended, measured=measured, reference=reference)
 
 
 def _head(status: Status | None, override: float, modes: Modes | None) -> str:
