@@ -54,6 +54,7 @@ class PageKernelApp(kernelapp.IPKernelApp):
         if self.transport == "ipc":
             # 1 to 5 are Jupyter's
             kernelapp.IOPubThread = partial(_Output, f"ipc://{self.ip}-6")  # type: ignore[misc, assignment]
+        context.setsockopt(zmq.SNDHWM, 0)  # by default more than 1000 messages that wait are thrown away
         super().init_iopub(context)
 
 
