@@ -191,6 +191,39 @@ def test_kernels_end_with_the_server_though_compiled_code_holds_one(
         idle.kill()
 
 
+MANY = 20_000  # a panel that is opened is up to 948; ZeroMQ keeps 2,000 of its own, and a socket some more
+PANEL_OPENS = f"""
+kernel = get_ipython().kernel
+for number in range({MANY}):
+    kernel.session.send(kernel.iopub_socket, "comm_msg", {{"data": {{"number": number}}}})
+"""
+
+
+def test_a_page_that_reads_late_misses_no_message(
+    ready: ReadyKernels, alone: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More than 2,000 that wait were thrown away: what such a message makes or shows is never there."""
+    monkeypatch.setenv("JUPYTER_PATH", str(APP / "share" / "jupyter"))
+    offer(ready)
+    manager: Any = KernelManager(kernel_name="rds", connection_file=str(alone / "connection.json"))
+    manager.start_kernel(cwd=str(alone), env=os.environ | {"SAID": "", "APP": ""})
+    client = manager.client()
+    try:
+        client.start_channels()
+        client.wait_for_ready(timeout=60)
+        sent = client.execute(PANEL_OPENS)
+        while client.get_shell_msg(timeout=60)["parent_header"]["msg_id"] != sent:
+            pass  # the reply to an earlier question
+        found: list[int] = []
+        while (message := client.get_iopub_msg(timeout=60))["content"].get("execution_state") != "idle" or not found:
+            if message["msg_type"] == "comm_msg":
+                found.append(message["content"]["data"]["number"])
+        assert found == list(range(MANY))
+    finally:
+        client.stop_channels()
+        manager.shutdown_kernel(now=True)
+
+
 def test_a_page_waits_for_minutes_for_what_its_kernel_shows() -> None:
     """On a busy computer its hundreds of messages come late, and a page that does not wait for them stays empty."""
     pytest.importorskip("voila", reason="Voilà is not installed: it is in the extra lab")
