@@ -23,6 +23,12 @@ MEMORY_LIMIT = 4 << 30  # bytes of address space: an interpreter with scipy and 
 _START_UP = 15.0  # s that a loaded machine may take before the worker's own time limit runs
 _FUNCTION = {"controller": "control()", "model": "the model", "interpolator": "interpolate()", "file": "the file"}
 _LARGEST = 1 << 20  # bytes of result
+_OTHER_FILES = {  # by their endings
+    **dict.fromkeys((".ngc", ".nc", ".tap", ".gcode"), "`rds nc check` looks at a part program"),
+    **dict.fromkeys((".csv", ".tsv", ".mat", ".parquet", ".mf4"), "`rds data describe` looks at a log"),
+    **dict.fromkeys((".dxf", ".svg"), "`rds nc make` looks at a drawing"),
+    ".ncc": "`rds machine new` reads a configuration script",
+}
 # Many threads of a matrix library need more address space than a student's file, and no time is gained by them.
 _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",
@@ -49,10 +55,12 @@ def check_file(
     exits is a fault in the report; what it prints is counted in a warning. A `coupled` controller gets `axes` axes.
     `pulse()` is called ten times a second meanwhile: what it raises ends the check.
     This protects from accidents, not from attacks. Raises InputError, with file and line, for a file that is
-    missing, cannot be read or run, or fills no interface.
+    missing, is of another kind, cannot be read or run, or fills no interface.
     """
     SAMPLE_PERIOD.check(sample_period, "sample_period")
     file = Path(path).absolute()
+    if other := _OTHER_FILES.get(file.suffix.lower()):  # it would be run as Python
+        raise InputError(f"it is no Python file; {other}", str(path))
     with tempfile.TemporaryDirectory(prefix="rds-check-") as folder:
         result, trace = Path(folder, "result"), Path(folder, "trace")
         request = {

@@ -196,14 +196,6 @@ def run(
     raise typer.Exit(exit_code(result))
 
 
-_CHECKED_BY = {
-    **dict.fromkeys((".ngc", ".nc", ".tap", ".gcode"), "`rds nc check` looks at a part program"),
-    **dict.fromkeys((".csv", ".tsv", ".mat", ".parquet", ".mf4"), "`rds data describe` looks at a log"),
-    **dict.fromkeys((".dxf", ".svg"), "`rds nc make` looks at a drawing"),
-    ".ncc": "`rds machine new` reads a configuration script",
-}
-
-
 @app.command()
 def check(
     file: Annotated[
@@ -233,8 +225,6 @@ def check(
         else:
             from rds.checks import check_file
 
-            if other := _CHECKED_BY.get(file.suffix.lower()):  # it would be run as Python
-                raise InputError(f"it is no Python file; {other}", str(file))
             report = check_file(file, sample_period, coupled=axes is not None, axes=axes or 2)
     if json:
         print_json(report.to_json())
