@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from rds.core import drawing
 from rds.core.atomic import write_whole
 from rds.core.types import Ending, Verdict
+from rds.modes import load_mode
 from rds.modes.experiment.experiment import Experiment
 from rds.modes.experiment.experiment_file import PATHS
 from rds.modes.experiment.folder import new_folder
@@ -27,6 +29,8 @@ def run_and_save(
     """Run the experiment in the file `path`, and save tables, plots and a report in `out` (default: under runs/)."""
     experiment = Experiment.from_toml(path)
     folder = out if out is not None else folder_of(experiment, mode)
+    if load_mode(mode or experiment.mode).real_time:
+        drawing.ready()  # what it imports would make samples late
     result = experiment.run(mode, out=folder, progress=progress)
     return result, save_run(result, experiment.plan(mode).program, folder, experiment.title or path.stem)
 
@@ -52,10 +56,8 @@ def save_with_report(result: Result, folder: Path, title: str, beside: Sequence[
 
     The tables are in `folder` already: the run has saved them there before anything else could go wrong.
     """
-    from rds.results.plots import overview
-
     files = saved_files(folder)
-    drawn = {axis: overview(result, axis).png() for axis in result.axes}
+    drawn = drawing.drawn("rds.results.plots", "overviews", result)
     for axis, picture in drawn.items():
         files[f"plot_{axis}"] = write_whole(folder / f"{axis}.png", picture)
     files["report"] = write_report(
