@@ -44,10 +44,12 @@ tables: $(DONE) ## make docs/library.md and the JSON Schemas afresh from the pro
 # The newest page of Voilà and the newest extension for its widgets that were built with one JupyterLab. With later ones
 # the page is the same, and the browser's console has up to 13 warnings.
 SAME_LAB := 'voila<=0.5.8' 'jupyterlab-widgets<=3.0.13'
+# Later ones import pydantic to read a command's arguments, which takes each command up to a tenth of a second longer.
+LIGHT := 'typer<0.29'
 
 lock: ## renew requirements.lock from pyproject.toml (needs uv)
 	@test -n "$(UV)" || { echo "make lock needs uv: https://docs.astral.sh/uv/" >&2; exit 2; }
-	printf '%s\n' 'hatchling>=1.25' 'editables>=0.5' $(SAME_LAB) | "$(UV)" pip compile pyproject.toml - --all-extras --universal \
+	printf '%s\n' 'hatchling>=1.25' 'editables>=0.5' $(SAME_LAB) $(LIGHT) | "$(UV)" pip compile pyproject.toml - --all-extras --universal \
 		--python-version 3.11 --generate-hashes --upgrade --quiet --no-annotate \
 		--no-emit-index-url --no-emit-find-links \
 		--custom-compile-command "make lock" --output-file requirements.lock
