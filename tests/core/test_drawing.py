@@ -5,11 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 from rds.core import drawing
-from rds.modes.experiment import Experiment, report
+from rds.core.errors import RdsError
+from rds.modes.experiment import Experiment
+from rds.modes.process import host
 
 ASKS = """
 import os, sys, time
@@ -49,16 +52,23 @@ def test_what_is_drawn_does_not_hang_on_the_process(first: str, then: str, funct
     assert fault.startswith("Expecting property name")
 
 
-@pytest.mark.parametrize(("mode", "waits"), [(None, False), ("emulation", True)])
 def test_a_run_against_the_clock_begins_when_it_has_imported_all(
-    mode: str | None, waits: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order = []
     monkeypatch.setattr(drawing, "ready", lambda: order.append("ready"))
-    monkeypatch.setattr(Experiment, "run", lambda *_, **__: order.append("run"))
-    monkeypatch.setattr(report, "save_run", lambda *_: {})
-    report.run_and_save(_experiment(tmp_path), mode, tmp_path / "out", None)
-    assert order == ["ready"] * waits + ["run"]
+
+    def _recorded(*_: object) -> NoReturn:
+        order.append("run")
+        raise RdsError
+
+    monkeypatch.setattr(host, "_recorded", _recorded)
+    experiment = Experiment.from_toml(_experiment(tmp_path))
+    experiment.run()
+    assert order == []
+    with pytest.raises(RdsError):
+        experiment.run("emulation", out=tmp_path / "out")
+    assert order == ["ready", "run"]
 
 
 def _experiment(folder: Path) -> Path:

@@ -9,7 +9,6 @@ from typing import Any
 from rds.core import drawing
 from rds.core.atomic import write_whole
 from rds.core.types import Ending, Verdict
-from rds.modes import load_mode
 from rds.modes.experiment.experiment import Experiment
 from rds.modes.experiment.experiment_file import PATHS
 from rds.modes.experiment.folder import new_folder
@@ -29,8 +28,6 @@ def run_and_save(
     """Run the experiment in the file `path`, and save tables, plots and a report in `out` (default: under runs/)."""
     experiment = Experiment.from_toml(path)
     folder = out if out is not None else folder_of(experiment, mode)
-    if load_mode(mode or experiment.mode).real_time:
-        drawing.ready()  # what it imports would make samples late
     result = experiment.run(mode, out=folder, progress=progress)
     return result, save_run(result, experiment.plan(mode).program, folder, experiment.title or path.stem)
 

@@ -19,6 +19,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from rds.core import drawing
 from rds.core.blame import STUDENT_ERRORS
 from rds.core.errors import ContractError, InputError
 from rds.core.interrupt import Endless, interruptible, limited
@@ -136,6 +137,7 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
 
 def _in_target(plan: Plan, directory: Path, lock: int, progress: Progress | None, live: Live) -> Rows:
     """A real-time run, in a target process that a recorder starts; `lock` holds the folder."""
+    drawing.ready()  # a process that still imports matplotlib would make samples late
     mode = load_mode(plan.mode)
     columns, units = plan.columns(mode.followed, mode.simulates_plant)
     columns[1:1] = TIMING_COLUMNS
