@@ -29,10 +29,10 @@ def main() -> None:
             gc.freeze()  # or Python would go through all that was imported once more before it ends
             if code is not None:
                 sys.exit(code)
-        if sys.argv[1:2] == ["run"] and "--help" not in sys.argv:
+        if (sys.argv[1:2] == ["run"] or sys.argv[1:3] == ["nc", "run"]) and "--help" not in sys.argv:
             from rds.core.drawing import begin
 
-            begin("rds.results.plots")  # on another processor, while all else is imported here and the run computes
+            begin("rds.results.pictures")  # on another processor, while all else is imported here and the run computes
         from rds.cli.main import main as run
 
         run()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
@@ -26,6 +27,7 @@ class _Process:
     asked: IO[bytes]
     answers: IO[bytes]
     is_ready: bool = False
+    is_busy: bool = False  # it draws what nobody has waited for yet
 
 
 _process: _Process | None = None  # the one of this program
@@ -50,33 +52,50 @@ def begin(module: str) -> None:
 
 def ready() -> None:
     """Wait until the process, if there is one, has imported all it needs: then it does nothing until it is asked."""
-    global _process
     if _process is None or _process.is_ready:
         return
     with suppress(OSError, ValueError):  # ValueError: a file that the student's code closed
         _process.is_ready = _process.answers.read(1) == _READY
     if not _process.is_ready:
-        _process = None
+        _end()
 
 
-def drawn(module: str, function: str, *arguments: Any) -> Any:
-    """What the function of that name in `module` returns: called in the process if there is one, else here."""
-    global _process
+def asked(module: str, function: str, *arguments: Any) -> Callable[[], Any]:
+    """Let the function of that name in `module` be called; what is returned waits for its answer, and gives it.
+
+    It is called in the process if there is one that does nothing else, and otherwise here, once the answer is wanted.
+    """
     ready()
-    if _process is not None:
-        try:
-            _process.asked.write(pickle.dumps((module, function, arguments)))
-            _process.asked.flush()
-            is_drawn, answer = pickle.load(_process.answers)
-            if is_drawn:
-                return answer
-        except Exception:  # it was killed, or this cannot be pickled: no reason to have no picture
-            _process = None
-    return getattr(import_module(module), function)(*arguments)
+    process = _process
+    if process is None or process.is_busy:
+        return lambda: getattr(import_module(module), function)(*arguments)
+    try:
+        process.asked.write(pickle.dumps((module, function, arguments)))
+        process.asked.flush()
+        process.is_busy = True
+    except Exception:  # it was killed, or this cannot be pickled
+        _end()
+
+    def answer() -> Any:
+        if process.is_busy:
+            try:
+                drawn = pickle.load(process.answers)
+                process.is_busy = False
+                return drawn
+            except Exception:  # it ended, and what ended it is raised below, unless somebody has killed it
+                _end()
+        return getattr(import_module(module), function)(*arguments)
+
+    return answer
+
+
+def _end() -> None:
+    global _process
+    _process = None
 
 
 def _draw(module: str, asked: IO[bytes], answers: IO[bytes]) -> NoReturn:
-    """In the process: until nobody can ask any more."""
+    """In the process: until nobody can ask any more, or something cannot be drawn."""
     with suppress(BaseException):
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal's Ctrl-C is for the run
         end_with_parent()
@@ -85,17 +104,7 @@ def _draw(module: str, asked: IO[bytes], answers: IO[bytes]) -> NoReturn:
         answers.write(_READY)
         answers.flush()
         while True:
-            answers.write(pickle.dumps(_answer(asked)))
+            named, function, arguments = pickle.load(asked)
+            answers.write(pickle.dumps(getattr(import_module(named), function)(*arguments)))
             answers.flush()
     os._exit(0)
-
-
-def _answer(asked: IO[bytes]) -> tuple[bool, Any]:
-    """Whether it could be drawn, and what: an error is raised where the same is tried again, with its own traceback."""
-    try:
-        module, function, arguments = pickle.load(asked)
-        return True, getattr(import_module(module), function)(*arguments)
-    except EOFError:
-        raise
-    except Exception:
-        return False, None

@@ -32,11 +32,6 @@ def overview(result: Result, axis: str | None = None) -> Picture:
     return _grid(result, axis, [_RESPONSE, _ERROR, _VOLTAGE])
 
 
-def overviews(result: Result) -> dict[str, bytes]:
-    """The overview of each axis, as PNG."""
-    return {axis: overview(result, axis).png() for axis in result.axes}
-
-
 def response(result: Result, axis: str | None = None) -> Picture:
     """Reference, measured, modelled and simulated response over time."""
     return _grid(result, axis, [_RESPONSE])

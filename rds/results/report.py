@@ -13,10 +13,8 @@ from urllib.parse import quote
 from rds.core.atomic import write_files
 from rds.core.errors import InputError
 from rds.results import html
-from rds.results.late_samples import total_time
 from rds.results.metrics import ERROR_METRICS, axis_metrics, metric_units
 from rds.results.result import Result
-from rds.results.signals import signals_of
 from rds.results.units import heading
 
 # no script, nothing loaded from outside, even if a text from a student's file slipped through
@@ -31,17 +29,17 @@ def write_report(
     notes: Sequence[str] = (),
     files: Sequence[str | Path] = (),
     sections: Sequence[str] = (),
-    overviews: Sequence[bytes] = (),
+    pictures: Sequence[Mapping[str, bytes]] = (),
 ) -> Path:
     """Write the report of `results`, one section each, to `path`; whole or not at all.
 
     `tables` are shown first, each {title, columns, rows, note}; `notes` are sentences under the title; `files` are
     linked by their way from the report. All text is escaped; `sections` are HTML, and stand as they are after the
-    tables; `overviews` are the pictures (PNG) that `plots.overview` gives of the results, if they are drawn already.
+    tables; `pictures` are what `pictures.of_report` gives of each result, if they are drawn already.
     Raises InputError for a table that lacks its columns or rows, no results, or a path that can't be written.
     """
     path = Path(path)
-    text = report(title, results, tables, notes, [_link(path, file) for file in files], sections, overviews)
+    text = report(title, results, tables, notes, [_link(path, file) for file in files], sections, pictures)
 
     def write(stream: BinaryIO) -> None:
         stream.write(text.encode("utf-8", "backslashreplace"))
@@ -57,15 +55,16 @@ def report(
     notes: Sequence[str] = (),
     files: Sequence[str] = (),
     sections: Sequence[str] = (),
-    overviews: Sequence[bytes] = (),
+    pictures: Sequence[Mapping[str, bytes]] = (),
 ) -> str:
-    """The report as HTML text; `files` are relative paths, `sections` HTML, `overviews` PNG or none."""
-    from rds.results import plots
-
+    """The report as HTML text; `files` are relative paths, `sections` HTML, `pictures` as for `write_report`."""
     if not results:
         raise InputError("there is nothing to report; give at least one result")
     labels = _labels(results)
-    overviews = overviews or [plots.overview(result).png() for result in results]
+    if not pictures:
+        from rds.results.pictures import of_report
+
+        pictures = [of_report(result) for result in results]
     parts = [
         f"<header><h1>{escape(title)}</h1>{_subtitle(results)}{html.notes_list(notes)}</header>",
         f"<section><h2>Runs</h2>{_runs(results, labels)}{_verdicts(results, labels)}</section>",
@@ -73,7 +72,7 @@ def report(
         *sections,
         f"<section><h2>Tracking and fit</h2>{_metrics(results, labels)}</section>",
         _together(results, labels),
-        *(_run_section(*of_one) for of_one in zip(results, labels, overviews, strict=True)),
+        *(_run_section(*of_one) for of_one in zip(results, labels, pictures, strict=True)),
         _files(files),
     ]
     return page(title, "\n".join(filter(None, parts)))
@@ -170,16 +169,10 @@ def _together(results: Sequence[Result], labels: Sequence[str]) -> str:
     return f"<section><h2>All runs over each other</h2>{_image(modes(results, labels).png(), 'all runs')}</section>"
 
 
-def _run_section(result: Result, label: str, overview: bytes) -> str:
-    from rds.results import plots_signals, plots_timing
-
-    pictures = [_image(overview, f"{label}: response, error and voltage")]
-    if any(signals_of(result, axis) for axis in result.axes) and len(result):
-        pictures.append(_image(plots_signals.signals(result).png(), f"{label}: signals of the controllers"))
-    if total_time(result) is not None and len(result):
-        pictures.append(_image(plots_timing.timing(result).png(), f"{label}: timing"))
+def _run_section(result: Result, label: str, pictures: Mapping[str, bytes]) -> str:
+    shown = "".join(_image(png, f"{label}: {title}") for title, png in pictures.items())
     return (
-        f"<section><h2>{escape(label.capitalize())}</h2>{''.join(pictures)}"
+        f"<section><h2>{escape(label.capitalize())}</h2>{shown}"
         f"{_environment(result)}{_timing(result)}{_details('Controller', result.meta.get('controller'))}"
         f"{_details('Model', result.meta.get('model'))}"
         "</section>"

@@ -20,10 +20,10 @@ from rds.core import drawing
 {first}
 drawing.begin("json")
 {then}
-print(*(drawing.drawn("os", "getpid") == os.getpid() for _ in range(2)))
-print(drawing.drawn("json", "dumps", [1.5]), drawing.drawn("operator", "call", {function}))
+print(*(drawing.asked("os", "getpid")() == os.getpid() for _ in range(2)))
+print(drawing.asked("json", "dumps", [1.5])(), drawing.asked("operator", "call", {function})())
 try:
-    drawing.drawn("json", "loads", "{{")
+    drawing.asked("json", "loads", "{{")()
 except ValueError as error:
     print(error)
 """
@@ -50,6 +50,18 @@ def test_what_is_drawn_does_not_hang_on_the_process(first: str, then: str, funct
     assert where == f"{here} {here}"
     assert drawn == "[1.5] {}"
     assert fault.startswith("Expecting property name")
+
+
+def test_while_it_draws_others_are_drawn_here() -> None:
+    code = """
+import os
+from rds.core import drawing
+drawing.begin("json")
+first, second = (drawing.asked("os", "getpid") for _ in range(2))
+print(second() == os.getpid(), first() == os.getpid(), drawing.asked("os", "getpid")() == os.getpid())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout == "True False False\n", done.stderr
 
 
 def test_a_run_against_the_clock_begins_when_it_has_imported_all(

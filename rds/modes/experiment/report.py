@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rds.core import drawing
 from rds.core.atomic import write_whole
@@ -18,6 +18,10 @@ from rds.results import Result
 from rds.results.files import saved_files
 from rds.results.report import write_report
 
+if TYPE_CHECKING:
+    from rds.results.pictures import Pictures
+
+PICTURES = "rds.results.pictures"  # the module that draws them
 METRICS = ("mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_abs_error", "rms_error", "fit_percent")
 STAGE_FIGURES = ("p50", "p99", "p999", "max")
 
@@ -48,14 +52,21 @@ def folder_of(experiment: Experiment, mode: str | None) -> Path:
     return new_folder(plan.names, plan.mode)
 
 
-def save_with_report(result: Result, folder: Path, title: str, beside: Sequence[Path] = ()) -> dict[str, Path]:
+def save_with_report(
+    result: Result,
+    folder: Path,
+    title: str,
+    beside: Sequence[Path] = (),
+    pictures: Callable[[], Pictures] | None = None,
+) -> dict[str, Path]:
     """One plot per axis and the report, which also links what is `beside` it; each file's path by its kind.
 
-    The tables are in `folder` already: the run has saved them there before anything else could go wrong.
+    `pictures` are what `pictures_of` gave, if that was called before. The tables are in `folder` already: the run has
+    saved them there before anything else could go wrong.
     """
     files = saved_files(folder)
-    drawn = drawing.drawn("rds.results.plots", "overviews", result)
-    for axis, picture in drawn.items():
+    drawn = (pictures or pictures_of(result))()
+    for axis, picture in drawn.axes.items():
         files[f"plot_{axis}"] = write_whole(folder / f"{axis}.png", picture)
     files["report"] = write_report(
         folder / "report.html",
@@ -63,9 +74,14 @@ def save_with_report(result: Result, folder: Path, title: str, beside: Sequence[
         [result],
         files=[*beside, *files.values()],
         sections=_validations(result),
-        overviews=list(drawn.values()) if len(drawn) == 1 else (),  # several axes stand beside each other there
+        pictures=[drawn.report],
     )
     return files
+
+
+def pictures_of(result: Result) -> Callable[[], Pictures]:
+    """Begin to draw a run's pictures, where another process can do it; the function waits for them."""
+    return drawing.asked(PICTURES, "pictures", result)
 
 
 def _validations(result: Result) -> list[str]:

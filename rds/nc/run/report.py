@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rds.modes.experiment.report import save_with_report
+from rds.modes.experiment.report import pictures_of, save_with_report
 from rds.nc.path_block import PathBlock
 from rds.nc.run.judge import WAITS, worst_lines
 from rds.nc.run.prepare import Prepared
@@ -30,11 +30,12 @@ _WAITED = {
 
 def save_run(result: Result, prepared: Prepared, folder: Path, title: str | None = None) -> dict[str, Path]:
     """Save pictures and reports beside the tables in `folder`; each file's path by its kind."""
+    pictures = pictures_of(result)  # while the program's own are drawn here
     written = write(program_report(result, prepared), folder)
     for pattern in ("*.csv", "*.png"):  # a table that an earlier run had and this one has not
         for left in set(folder.glob(f"{KIND}-{pattern}")) - set(written):
             left.unlink(missing_ok=True)
-    files = save_with_report(result, folder, title or f"{prepared.file.name}, {result.mode}", written)
+    files = save_with_report(result, folder, title or f"{prepared.file.name}, {result.mode}", written, pictures)
     return files | {KIND: written[0]} | {path.stem: path for path in written[1:] if path.suffix == ".png"}
 
 
