@@ -83,7 +83,7 @@ def info(
 @module_app.command()
 def tune(
     context: typer.Context,
-    controller: Annotated[str | None, typer.Option(help="PI or PID.")] = None,
+    controller: Annotated[str | None, typer.Option(help="P, PI or PID; P is PI with Ki = 0.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A tuning parameter.")] = None,
     from_step: Annotated[
         Path | None, typer.Option(help="Gains by Ziegler and Nichols from a recorded step (rds module ID step).")
@@ -94,11 +94,12 @@ def tune(
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
-    """Select PI or PID and set gains and limits; without options, show what is in force."""
+    """Select P, PI or PID and set gains and limits; without options, show what is in force."""
     with _module(context, (interface, channel, experiment, bitrate)) as module:
         parameters = _pairs(set_ or ())
         if from_step is not None:
-            parameters = _gains(from_step, controller or "PID") | parameters
+            controller = controller or module.tuning().controller.name  # the gains of another one would not fit it
+            parameters = _gains(from_step, controller) | parameters
         changes = bool(parameters) or controller is not None
         tuning = module.tune(controller, **parameters) if changes else module.tuning()
     from dataclasses import asdict

@@ -101,9 +101,9 @@ def assembled(name: str, order: Order, data: Mapping[int, Data]) -> Machine:
 def machine_text(name: str, order: Order, data: Mapping[int, Data], before: Machine | None = None) -> str:
     """The machine's file, as TOML; InputError with the first fault of the order.
 
-    What no module knows is taken from `before`, the machine that was reconfigured: its converter, and model, limits,
-    power and physics of the axes whose module is of the same number and type; else from a machine of the
-    package that has a module of this type; else it is chosen, within the speeds that the module says.
+    What no module knows is taken from `before`, the machine that was reconfigured: its converter and supply, and model,
+    limits, power, currents and physics of the axes whose module is of the same number and type; else from a machine of
+    the package that has a module of this type; else it is chosen, within the speeds that the module says.
     """
     found = judged(order, data, name)
     if not found.ok:
@@ -113,6 +113,8 @@ def machine_text(name: str, order: Order, data: Mapping[int, Data], before: Mach
     if before is not None:
         table["sample_period"] = before.sample_period
         table["converter"] = asdict(before.converter)
+        if before.power is not None:
+            table["power"] = asdict(before.power)
     known, machines = [], _with_such_modules(table["axis"].values())
     for letter, axis in table["axis"].items():
         kept, source = _kept(axis, before, machines)
@@ -133,7 +135,7 @@ def _type_text(machine: Machine, axis: Axis) -> str:
 
 
 def _kept(axis: Mapping[str, Any], before: Machine | None, packaged: Sequence[Machine]) -> tuple[dict[str, Any], str]:
-    """Model, limits, power and physics of an axis with such a module, and the machine that it is of."""
+    """Model, limits, power, currents and physics of an axis with such a module, and the machine that it is of."""
     for machine in chain([] if before is None else [before], packaged):
         for known in machine.axes.values():
             same = machine is not before or known.node == axis["node"]
@@ -143,7 +145,8 @@ def _kept(axis: Mapping[str, Any], before: Machine | None, packaged: Sequence[Ma
                 power = {"power": known.power} if known.power is not None else {}
                 made = {key: dict(value) for key, value in tables.items() if value} | limits | power
                 if made:
-                    return made, machine.name
+                    currents = {key: value for key, value in known.module.items() if "current_" in key}
+                    return made | {"module": {**axis["module"], **currents}}, machine.name
     return {}, ""
 
 

@@ -256,6 +256,7 @@ def _completed(script: Script, name: str, before: Machine | None) -> dict[str, A
     axes, known = table["axis"], {} if before is None else before.axes
     if before is not None:
         table |= {"sample_period": before.sample_period, "converter": asdict(before.converter)}
+        table |= {"power": asdict(before.power)} if before.power is not None else {}
         axes |= {axis.name: axis_table(axis) for axis in known.values() if axis.is_spindle and axis.name not in axes}
     taken = {axis.node for axis in known.values()}
     moving = {link["axis"]: link for link in table["link"] if "axis" in link}

@@ -84,6 +84,8 @@ class _Converter:
         self._speed = 0.0  # rev/min, as last said
         self._turning = 0  # +1 clockwise, −1 counter-clockwise
         self._stood = False  # has been told to turn at no speed
+        self._unused: ProgramError | None = None  # the first speed, as long as nothing has switched the spindle on
+        self._started = False  # M3 or M4 has
         self._tool = self._selected = 0
         self._position = self._joints = np.zeros(6)  # as programmed, and of the joints
         self._tool_centre, self._for_tip = tool_centre, False
@@ -115,6 +117,8 @@ class _Converter:
         """A program without M2 or M30 ends with its last line."""
         self._convert()
         self._passed_over.end()
+        if self._unused is not None and not self._started:
+            self._warn(self._unused)
         if not self._ended:
             self._event("end", 0.0, self._last_line)
         self.flush()
@@ -176,6 +180,11 @@ class _Converter:
         given = rows[speeds]
         if len(speeds):
             self._speed = float(given["values"][-1, 0])
+            if self._speed and self._unused is None:
+                message = (
+                    "no M3 or M4 of the program starts the spindle, which stands still; write one, or leave S away"
+                )
+                self._unused = ProgramError(message, file=self._file, line=int(given["line"][-1]))
         rates, angular, rate_lines = self._feeds.of(rows, self._frame.unit, self._speed * abs(self._turning))
         moves = np.flatnonzero(rows["kind"] <= ARC)
         rows, rates, angular, rate_lines = rows[moves], rates[moves], angular[moves], rate_lines[moves]
@@ -293,11 +302,11 @@ class _Converter:
                 self._spin(speed, line, segments)
 
     def _clockwise(self, call: Call) -> None:
-        self._turning = 1
+        self._turning, self._started = 1, True
         self._spin(self._speed, call.line)
 
     def _counterclockwise(self, call: Call) -> None:
-        self._turning = -1
+        self._turning, self._started = -1, True
         self._spin(self._speed, call.line)
 
     def _spin(self, speed: float, line: int, segments: int = 0) -> None:

@@ -30,3 +30,21 @@ def test_a_run_that_leaves_the_travel_is_told(tmp_path: Path, error: str, is_tol
 def test_where_no_law_drives_the_signal_is_to_be_looked_at() -> None:
     result = Experiment(signal={"kind": "constant", "value": 5.0}, duration=10.0).run()
     assert [note.rpartition("look at ")[2] for note in result.meta["notes"]] == ["the signal"]
+
+
+MODEL = """initial_state = [0.0]
+
+
+def derivatives(t, x, u, params):
+    return [(1000.0 * u[0] {sign} x[0]) / 0.08]
+"""
+
+
+@pytest.mark.parametrize(("sign", "is_told"), [("+", True), ("-", False)])
+def test_a_model_of_ones_own_that_is_unstable_is_told(tmp_path: Path, sign: str, is_told: bool) -> None:
+    (tmp_path / "model.py").write_text(MODEL.format(sign=sign))
+    signal = {"kind": "constant", "value": 2.0}
+    result = Experiment(axis="spindle", signal=signal, model=tmp_path / "model.py", duration=3.0).run()
+    told = [note for note in result.meta["notes"] if "beyond its range of -10000 to 10000 rev/min" in note]
+    assert bool(told) is is_told
+    assert all(note.endswith("look at the signal, and at whether your model is stable (`rds check`)") for note in told)

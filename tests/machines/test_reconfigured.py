@@ -14,6 +14,7 @@ from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.machines.assembly import judged, machine_text, order_of
 from rds.machines.ncc import machine_text_of_script, read_script, script_of
+from rds.machines.power import power_budget
 from rds.nc.run.run import PartProgram
 
 ORDERS = {
@@ -59,6 +60,16 @@ def test_a_machine_from_what_its_modules_say(name: str, tmp_path: Path) -> None:
     if "work-table" in ORDERS[name] or own.tool is None:
         np.testing.assert_allclose(away, away[:1].repeat(20, axis=0), atol=1e-4)
     run_on(path, tmp_path)
+
+
+def test_the_power_budget_goes_on_after_a_reconfiguration(tmp_path: Path) -> None:
+    own, data, path = load_machine("mrmt-oacs"), described("mrmt-oacs"), tmp_path / "two.toml"
+    path.write_text(machine_text("two", [5, "oacs-range-arm", 2], data, own))
+    two = power_budget(load_machine(str(path)))
+    assert (two.voltage, two.current, two.unknown) == (12.0, 29.0, ())
+    assert two.peak == pytest.approx(6.2 + 3.9)  # A, of Z and the drill
+    path.write_text(machine_text_of_script(read_script(script_of(own.kinematics)), "scripted", own))
+    assert load_machine(str(path)).power == own.power
 
 
 def test_a_module_that_left_leaves_the_order_of_the_others() -> None:

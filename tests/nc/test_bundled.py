@@ -59,7 +59,11 @@ def test_it_is_valid_and_runs_in_simulation(program: Bundled, tmp_path: Path) ->
     done = CliRunner().invoke(app, ["nc", "check", str(file), "--machine", program.machine, "--json"])
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
-    assert found["ok"] and found["warnings"] == [] and found["segments"] > 0
+    assert found["ok"] and found["segments"] > 0
+    told = [warning["word"] for warning in found["warnings"]]
+    assert told == (["S1000"] if program.file == "oacs-p001.ngc" else []), (
+        "which the thesis's own program never turns on"
+    )
     part = PartProgram(file, program.machine, sample_period=0.005)  # coarser than the machine, to be quick
     result = part.run("simulation")
     assert result.meta["program"]["completed"]

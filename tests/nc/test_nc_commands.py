@@ -98,6 +98,7 @@ def test_check_of_an_invalid_program(folder: Path) -> None:
 
 WARNED = [
     ("M3\nG0 X1\nM2\n", "1:1: M3: warning: the spindle is on at a speed of 0, and stands still; give one (S)", 1),
+    ("G0 X1 S500\nM2\n", "1:7: S500: warning: no M3 or M4 of the program starts the spindle, which stands still", 1),
     ("S500 M3\nG0 X1 S0\nM2\n", "2:7: S0: warning: the spindle is on at a speed of 0", 1),
     ("\ufeffS500 M4\nS0 M3\nM2\n", "2:4: M3: warning: the spindle is on at a speed of 0", 1),
     ("G0 X1\nM2\n(note)\n\nG0 X2\nX3\n", "5: warning: the program ends by M2 in line 2, and what follows is", 1),

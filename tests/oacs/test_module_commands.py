@@ -65,8 +65,14 @@ def test_an_axis_from_scan_to_emergency_stop(serve: Serve, rds: Rds, said: Rds, 
     assert stepped["samples"] > 50 and Path(stepped["files"]["plot"]).stat().st_size > 5000
     assert stepped["response"]["unit"] == "mm" and abs(stepped["response"]["steady_error"]) < 0.5
     assert stepped["response"]["rise_time"] is None, "it ends 45 counts short of 338: never at 90 %"
+    pi = said("module", 4, "tune", "--from-step", stepped["files"]["csv"])
     gains = said("module", 4, "tune", "--from-step", stepped["files"]["csv"], "--controller", "PID")
+    assert pi["controller"] == "PI" and pi["Kp"] == pytest.approx(0.75 * gains["Kp"]), "the row of what is in force"
     assert gains["controller"] == "PID" and gains["Kp"] != 2.0 and gains["Kd"] > 0.0
+    only = said("module", 4, "tune", "--from-step", stepped["files"]["csv"], "--controller", "p")
+    assert (only["controller"], only["Ki"], only["Kd"]) == ("PI", 0.0, 0.0)
+    assert only["Kp"] == pytest.approx(gains["Kp"] / 1.2)
+    assert "controller P has no Ki" in refused(rds("module", 4, "tune", "--controller", "P", "--set", "Ki=1"))
     said("module", 4, "tune", "--set", "Kp=2", "--set", "Ki=0", "--set", "Kd=0", "--set", "kick=0")
     there = said("module", 4, "jog", "1", "--seconds", 0.3)
     assert there["unit"] == "mm" and there["position"] > 2.0

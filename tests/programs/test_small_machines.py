@@ -166,7 +166,8 @@ def test_p001_of_the_thesis_runs_and_says_what_is_assumed(tmp_path: Path) -> Non
     setup = Setup(options=Dialect(program_numbers=True, default_feed=True))
     for _ in range(2):  # the second time from the compiled form
         part = PartProgram(written(tmp_path, P001), "mrmt-oacs", setup=setup, sample_period=0.02)
-        (note,) = part.prepared.notes
+        note, idle = part.prepared.notes
+        assert "line 3" in idle and "no M3 or M4 of the program starts the spindle" in idle
         assert "line 2" in note and "the default feed of mrmt-oacs, 66 mm/min, is assumed" in note
     result = part.run()
     assert result.meta["program"]["completed"] and note in result.meta["notes"]

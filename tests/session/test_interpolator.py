@@ -214,6 +214,13 @@ def test_a_path_of_rds_is_in_the_list(tmp_path: Path) -> None:
     assert said["samples"] == done.samples and len(done.segments) == 21
 
 
+def test_programs_of_rds_are_read_with_the_machine_that_they_were_made_for(tmp_path: Path) -> None:
+    panel = Interpolating(Session(tmp_path, machine="mrmt-oacs"))  # which has no Y
+    for name, value in {"kind": "linear", "given": "bundled", "period": 0.01}.items():
+        panel.choices.set(name, value)
+    assert tuple(run(panel).axes) == ("X", "Y", "Z")
+
+
 def test_a_program_of_lines_is_refused_where_arcs_are_interpolated(tmp_path: Path) -> None:
     panel = make(tmp_path, kind="circular", given="bundled", bundled="square.ngc")
     with pytest.raises(InputError, match="segment 1 is a line, and interpolation is circular"):

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.machines import machine_names
 from rds.nc.active import Follower, modes_at
 from rds.panels.interpolator.motion import MADE
 from rds.panels.program.check import Look
@@ -41,9 +42,10 @@ def looked(made: Program) -> Look:
 # the text
 
 
-def test_a_folder_without_programs_begins_with_one_that_runs(tmp_path: Path) -> None:
-    made = program(tmp_path)
-    assert looked(made).ok and made.text.is_new
+@pytest.mark.parametrize("machine", machine_names())
+def test_a_folder_without_programs_begins_with_one_that_the_machine_can_run(machine: str, tmp_path: Path) -> None:
+    made = Program(Session(tmp_path, machine=machine))
+    assert looked(made).validation.segments > 1 and looked(made).ok and made.text.is_new
     assert not (tmp_path / "part.ngc").exists()
 
 

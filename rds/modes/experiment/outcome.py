@@ -63,18 +63,26 @@ def _of_another_period(plan: Plan) -> list[str]:
 
 
 def _beyond_travel(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
-    """A sentence for each axis that was beyond its travel, which an unstable law does first of all."""
+    """A sentence for each axis that was beyond its travel, which an unstable law or model does first of all.
+
+    Of a spindle it is a speed, and one that overshoots is no fault: it is told from ten times its range on.
+    """
     said = []
     for part in plan.axes:
         axis = part.axis
         measured = columns.get(f"{axis.name}_measured", np.empty(0))
         low, high = axis.travel
-        if axis.unit == "rev/min" or not ((measured < low) | (measured > high)).any():  # of a spindle it is a speed
+        turns = axis.unit == "rev/min"
+        beyond = 10.0 if turns else 1.0
+        if not ((measured < beyond * low) | (measured > beyond * high)).any():
             continue
         there = f"{np.nanmin(measured):.4g} to {np.nanmax(measured):.4g} {axis.unit}"
         cause = "the signal" if part.signal is not None else "the sign and the gains of the law"
+        if load_mode(plan.mode).simulates_plant and part.model.source.text is not None:  # a student's own
+            cause += ", and at whether your model is stable (`rds check`)"
         said.append(
-            f"{axis.name} was at {there}, beyond its travel of {low:g} to {high:g} {axis.unit}; look at {cause}"
+            f"{axis.name} was at {there}, beyond its {'range' if turns else 'travel'} of {low:g} to {high:g} "
+            f"{axis.unit}; look at {cause}"
         )
     return said
 

@@ -124,6 +124,10 @@ class Interpolating:
         program = self._program_path() if self.choices["given"] in (BUNDLED, PROGRAM) else None
         segments = [] if program is not None else self.segments()
         acceleration, chosen = self._acceleration(), self.choices.values()
+        of_rds = (
+            chosen["given"] == BUNDLED
+        )  # its axes, travels and speeds are those of the machine that it was made for
+        machine = find_bundled(chosen["bundled"]).machine if of_rds else self.session.machine
         for file in files:
             keep_file(file, f"interpolated with a feed of {chosen['feed']:g} {chosen['feed_unit']}")
 
@@ -141,7 +145,7 @@ class Interpolating:
                 self._check_kinds(path)
             elif program is not None:
                 task.note = "reading the program"
-                path, rests, self.notes = read_program(program, self.session.machine, T)
+                path, rests, self.notes = read_program(program, machine, T)
                 self._check_kinds(path)
             task.note = "interpolating"
             methods = {role: stoppable(self._interpolator(role, chosen), task) for role in self.roles}

@@ -15,6 +15,7 @@ from rds.nc.run.run import usual_controller
 from rds.panels.equipment.build import Builds
 from rds.panels.interpolator.fields import USER
 from rds.panels.interpolator.motion import OWN, PLANNED, filter_of, idle_motion, motion_fields
+from rds.panels.program.starter import starter
 from rds.panels.program.text import ProgramText, check_name, programs
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text, mode_choice
@@ -128,18 +129,21 @@ class Program:
         """The file that was open, else the first one: what cannot be edited does not keep the panel away."""
         name = str(self.choices["file"])
         try:
-            return ProgramText(self.session.folder, name)
+            return self._file(name)
         except InputError as error:
             self.trouble = str(error)
         number = 1
         while (self.session.folder / f"new-{number}.ngc").exists():
             number += 1
-        return ProgramText(self.session.folder, f"new-{number}.ngc")
+        return self._file(f"new-{number}.ngc")
+
+    def _file(self, name: str) -> ProgramText:
+        return ProgramText(self.session.folder, name, starter(self.machine))
 
     def _chosen(self, name: str) -> None:
         if name == "file" and self.choices["file"] != self.text.name:
             try:
-                self.text = ProgramText(self.session.folder, str(self.choices["file"]))
+                self.text = self._file(str(self.choices["file"]))
                 self.trouble = ""
             except InputError as error:
                 self.trouble = str(error)
@@ -167,7 +171,7 @@ class Program:
         check_name(name)
         self.trouble = ""
         if name == self.text.name:
-            self.text = ProgramText(self.session.folder, name)
+            self.text = self._file(name)
             self.look_again()
             return
         self.choices.set("file", name)
@@ -202,7 +206,7 @@ class Program:
         if self.text.changed or not self.text.replaced:
             return False
         try:
-            self.text = ProgramText(self.session.folder, self.text.name)
+            self.text = self._file(self.text.name)
         except InputError as error:
             self.text.accept()
             self.session.say(f"{self.text.name} was replaced by what cannot be edited here: {error}", "warning")

@@ -15,23 +15,6 @@ ENDINGS = (".ngc", ".nc", ".gcode", ".tap", ".cnc")
 LARGEST = 2 << 20  # bytes of a program that is edited here
 _NAME = re.compile(r"[^\x00-\x1f/\\:*?\"<>|]{1,100}")
 
-STARTER = """\
-(a square with one round corner; lengths in mm, feeds in mm/min)
-G21 G90 G17 G40 G49 G80 G94
-G64 P0.02
-S3000 M3
-G0 X0 Y0 Z5
-G1 Z-1 F300
-X20
-Y10
-G3 X10 Y20 I-10
-G1 X0
-Y0
-G0 Z5
-M5
-M30
-"""
-
 
 def check_name(name: str) -> None:
     """InputError unless `name` is that of a part program in the folder itself."""
@@ -57,12 +40,13 @@ def programs(folder: Path) -> list[str]:
 class ProgramText:
     """One file that is edited. InputError for a name that will not do, or a file that cannot be edited here.
 
-    A file that is not there begins with the text of the bundled program of its name, or with a small one that runs.
+    A file that is not there begins with the text of the bundled program of its name, or with `begin`.
     """
 
-    def __init__(self, folder: Path, name: str):
+    def __init__(self, folder: Path, name: str, begin: str = ""):
         check_name(name)
         self.name = name
+        self._begin = begin
         self.path = folder / name
         self.draft = folder / f".{name}.draft"
         self._open()
@@ -72,7 +56,7 @@ class ProgramText:
         saved, draft = _read(self.path), _read(self.draft)
         self._digest = _digest(saved)
         self._saved = saved
-        begin = bundled()[self.name].text() if self.name in bundled() else STARTER
+        begin = bundled()[self.name].text() if self.name in bundled() else self._begin
         self.text = draft if draft is not None else saved if saved is not None else begin
 
     @property

@@ -111,10 +111,15 @@ class Module:
         return Tuning(**values)
 
     def tune(self, controller: str | None = None, **parameters: float) -> Tuning:
-        """Select PI or PID and set the parameters given (fields of `Tuning`), all at once; return what is in force.
+        """Select P, PI or PID and set the parameters given (fields of `Tuning`), all at once; return what is in force.
 
-        InputError for one that cannot be; MachineError if the module refuses. A motion under way must end first.
+        A module knows PI and PID: P, the first row of table 11, is PI with Ki = 0. InputError for what cannot be;
+        MachineError if the module refuses. A motion under way must end first.
         """
+        if controller is not None and controller.upper() == "P":
+            if parameters.get("Ki"):
+                raise InputError(f"controller P has no Ki, and Ki = {parameters['Ki']:g} is given; use PI")
+            controller, parameters = "PI", {**parameters, "Ki": 0.0}
         before = self.tuning()
         numbers = {name: parameter for parameter, name in FIELDS.items()}
         wanted = before
@@ -124,7 +129,7 @@ class Module:
             wanted = wanted.with_parameter(numbers[name], value)
         if controller is not None:
             if controller.upper() not in Select.__members__:
-                raise InputError(f"controller {controller!r} must be PI or PID")
+                raise InputError(f"controller {controller!r} must be P, PI or PID")
             wanted = wanted.with_controller(Select[controller.upper()])
         command = self._link.command
         for name in parameters:

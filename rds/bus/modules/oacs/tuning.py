@@ -81,9 +81,9 @@ def ziegler_nichols(curve: ReactionCurve, controller: str = "PID") -> Gains:
         "PI": Gains(0.9 * T / L, 0.27 * T / L**2, 0.0),
         "PID": Gains(1.2 * T / L, 0.6 * T / L**2, 0.6 * T),
     }
-    if controller not in table:
+    if controller.upper() not in table:
         raise InputError(f"controller {controller!r} must be P, PI or PID")
-    return Gains(*(gain / K for gain in table[controller]))
+    return Gains(*(gain / K for gain in table[controller.upper()]))
 
 
 def reaction_curve(time: ArrayLike, output: ArrayLike, step: float | None = None) -> ReactionCurve:
