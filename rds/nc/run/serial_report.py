@@ -71,7 +71,7 @@ def _losses(run: MethodRun) -> list[str]:
     said, course = [], run.course
     if course.late > _LATE * course.steps:
         said.append(
-            f"Method {run.method}: the host sent {course.late} of {course.steps} frames late, which made steps longer "
+            f"Method {run.method}: the host sent {course.late} of {course.steps} frames late, which makes steps longer "
             "and shorter than planned: see to what else keeps this computer busy, or take B or C, which go by the "
             "nodes' clocks."
         )
