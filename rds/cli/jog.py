@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 _LOOKS = 0.05  # s
 _SPARE = 5.0  # s without a way made until an axis counts as stuck
 _THERE = 10.0  # counts from the goal that are there
+_SETTLES = 0.3  # s there, before an axis is let go: the loop still takes the last counts
 _STANDS = 0.01  # of its highest speed: a spindle that is slower stands
 
 
@@ -97,10 +99,12 @@ def _which(axis: str, named: list[str], allowed: list[str]) -> str:
 def _moved(hand: Jog, axis: str, goal: float, speed: float | None) -> tuple[dict[str, Any], str]:
     hand.go(axis, goal, speed)
     near, last, since = _THERE * hand.axes[axis].resolution, hand.positions[axis], time.monotonic()
+    there = inf  # when it came there
     while hand.ready:
         time.sleep(_LOOKS)
         at, now = hand.positions.get(axis, last), time.monotonic()
-        if abs(at - goal) <= near and not hand.moving:
+        there = min(there, now) if abs(at - goal) <= near and not hand.moving else inf
+        if now - there >= _SETTLES:
             return _stands(hand, axis, at)
         if abs(at - last) > near:
             last, since = at, now

@@ -216,7 +216,8 @@ def read_script(text: str, name: str = "", *, program: bool = False) -> Script:
             if not script.built and _MOTION.match(line):
                 script.check_built(number, f"{line.strip():.30}")
             script.line = number
-            raise script._error(f"{line.strip():.30} is no line of a configuration script; {_SAYS}")
+            behind = ", and name a part program that begins with a script .ngc" if script.built and not program else ""
+            raise script._error(f"{line.strip():.30} is no line of a configuration script; {_SAYS}{behind}")
     if not script.links and not script.changes:
         raise script._error("there is no link; write RF01 LN1 ..., and BUILD at its end")
     script.check_built(number, "the end of the script")

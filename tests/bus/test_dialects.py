@@ -6,10 +6,12 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from importlib import import_module
+from typing import Any
 from uuid import uuid4
 
 import pytest
 
+from rds import Experiment
 from rds.bus.modules.dialects import SERIAL_DIALECTS, dialect_names, is_served, server_module
 from rds.core.errors import InputError
 from rds.machines import Machine, load_machine
@@ -58,3 +60,18 @@ def test_a_serial_line_is_asked_in_its_own_dialect(served: Callable[[str], tuple
 def test_an_empty_channel_serves_nothing(dialect: str) -> None:
     interface = "serial" if dialect in SERIAL_DIALECTS else "virtual"
     assert not is_served(dialect, load_machine("mini-cnc"), interface, uuid4().hex)
+
+
+def test_a_machine_of_units_is_on_its_serial_line_where_nothing_says_so() -> None:
+    """Runs of the page and of `rds run` looked for it on the built-in bus, where its motors cannot be."""
+    still = {"kind": "constant", "value": 0.0}
+    words: dict[str, Any] = {"axis": "X", "duration": 1.0, "controller": "pid", "reference": still}
+
+    def bus(machine: str, **more: Any) -> dict[str, Any]:
+        return dict(Experiment(machine=machine, mode="implementation", **words, **more).plan().bus)
+
+    assert bus("starmill") == {"interface": "serial", "dialect": "dcs"}
+    assert bus("starmill", bus={"baud": 230_400}) == {"interface": "serial", "dialect": "dcs", "baud": 230_400}
+    assert bus("mini-cnc") == {} and bus("mini-cnc", bus={"bitrate": 500_000}) == {"bitrate": 500_000}
+    with pytest.raises(InputError, match="bitrate = 500000 is no option of a serial line"):
+        bus("starmill", bus={"bitrate": 500_000})

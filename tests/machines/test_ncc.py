@@ -82,7 +82,7 @@ LINK = "RF01 LN1 XA0 YA0 ZA# X0 Y0 Z0\n"
         (PAPER.replace("N005 BUILD\n", ""), 4, "the end of the script before BUILD"),
         (PAPER + ERRORS.replace("N008 BUILD\n", ""), 7, "the end of the script before BUILD"),
         (PAPER.replace("N005 BUILD", "N005 G0 X1"), 5, "N005 G0 X1 before BUILD"),
-        (PAPER + "G1 X5\n", 6, "G1 X5 is no line of a configuration script"),
+        (PAPER + "G1 X5\n", 6, "and name a part program that begins with a script .ngc"),
         ("hello world\n" + PAPER, 1, "hello world is no line of a configuration script; write RF01"),
         (PAPER.replace("BUILD", "BUILD X1"), 5, "BUILD stands alone"),
         ("RF02 LN3 UP1 LW1\n", 1, "UP1 must be more than LW1"),

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import pytest
 from machines.test_ncc import ERRORS, PAPER
 
+from rds.machines import load_machine
+from rds.nc.check import check_program
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.interpreter import Interpreter
+from rds.nc.setup import Setup
 
 PROGRAM = "G21 G90\nG1 X5 F100\nM2\n"
 
@@ -48,3 +52,12 @@ def test_what_is_wrong(text: str, ncc: bool, line: int, says: str) -> None:
         calls(text, ncc)
     assert says in str(refusal.value)
     assert refusal.value.line == line
+
+
+def test_each_line_of_a_script_that_the_option_does_not_switch_on_is_one_fault(tmp_path: Path) -> None:
+    """It was told word by word: RF01 LN1 XA0 is no line of G-code in a dozen ways."""
+    part = tmp_path / "part.ngc"
+    part.write_text(PAPER + "G21 G90\nM2\n")
+    found, _ = check_program(part, load_machine("mrm-mill"), Setup())
+    assert [fault.line for fault in found.faults] == [1, 2, 4, 5]  # a line with # is passed over
+    assert all("--with ncc" in fault.reason for fault in found.faults)

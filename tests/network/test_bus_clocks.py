@@ -41,3 +41,9 @@ def test_drifts_that_no_clock_has_are_refused(drift: str, message: str) -> None:
         measure_clocks("mini-cnc", drift=drift)
     told = CliRunner().invoke(app, ["network", "clocks", "--seconds", "0.5"])
     assert told.exit_code == 2 and "seconds = 0.5 are too few" in told.output
+
+
+def test_units_on_a_serial_line_tell_no_clocks() -> None:
+    """It was said that they did not start on the built-in bus, and to name a dialect, which this command does not."""
+    with pytest.raises(InputError, match="units on a serial line, which tell no clocks"):
+        measure_clocks("starmill")

@@ -203,8 +203,8 @@ def test_a_machine_says_its_default_feed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "options", "said"),
     [
-        (P001, {"program_numbers": True}, "no feed rate is set"),
-        (TABLE_5_2, {"program_numbers": True}, "the program does not end"),
+        (P001, {"program_numbers": True}, "no feed rate is set; .*`--with default-feed`"),
+        (TABLE_5_2, {"program_numbers": True}, "the program does not end; .*`--with open-end`"),
         ("G0 X1\nO001\nM2\n", {"program_numbers": True}, "a program number stands on the first block"),
         ("%\nG0 X1\n", {"open_end": True}, "the program does not end"),
         ("O1 SUB\nG0 X1\n", {"open_end": True}, "not closed before the file's end"),

@@ -176,3 +176,14 @@ def test_one_channel_is_served_once(served: Server) -> None:
     served()
     with pytest.raises(MachineError, match="serial line starmill is served already"):
         serve(load_machine("starmill"))
+
+
+def test_a_machine_of_seven_axes_is_on_no_serial_line(tmp_path: Path) -> None:
+    """A frame has places for six. It was said to be on the built-in bus, where such a machine may well be."""
+    axis = '[axis.{}]\nnode = {}\nunit = "mm"\ntravel = [0, 9]\nresolution = 0.01\n[axis.{}.model]\n{}\n'
+    model = 'name = "linear-axis"\ntau = 0.02\nK = 1.0'
+    axes = "".join(axis.format(name, node, name, model) for node, name in enumerate("XYZABCU", 2))
+    file = tmp_path / "seven.toml"
+    file.write_text(f'name = "seven"\nsample_period = 0.01\n[converter]\nrange = 10.0\nbits = 16\n{axes}')
+    with pytest.raises(MachineError, match=r"on a serial line did not start: .*7 axes; a frame has places for 6"):
+        start_server("dcs", str(file), "seven")

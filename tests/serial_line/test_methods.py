@@ -265,6 +265,15 @@ def test_steps_that_noise_took_from_a_frame_are_told(tmp_path: Path) -> None:
     assert not any("lost by motors" in sentence for sentence in said)
 
 
+def test_what_friction_leaves_of_a_servo_motor_is_no_lost_step(tmp_path: Path) -> None:
+    file = tmp_path / "part.ngc"
+    file.write_text("G21 G90 G61 F240\nG1 X2 Y1\nM2\n")
+    machine = load_machine("three-axis-mill")
+    run = run_method("C", serial_motion(file, machine), machine, baud=115_200)
+    assert any(run.lost.values()) and not run.astray
+    assert not any("lost" in said for said in methods_report([run], file, {"machine": machine.name}).findings)
+
+
 def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "part.ngc"
     file.write_text(CIRCLE)

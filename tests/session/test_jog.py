@@ -231,3 +231,11 @@ def test_an_axis_is_moved_from_the_command_line_as_from_the_panel(alone: Path) -
     ):
         refused = runner.invoke(app, ["jog", *words, "--json"])
         assert refused.exit_code == 2 and why in refused.stderr and not refused.stdout
+
+
+def test_an_axis_settles_and_is_told_to_stand_before_its_modules_end(alone: Path) -> None:
+    """It was told to stand at 1.02 mm, and that no zero volts could be sent to units that had been ended before."""
+    words = [sys.executable, "-m", "rds", "jog", "X", "--by", "1", "--machine", "starmill", "--json"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=4 * PATIENCE)
+    assert done.returncode == 0 and done.stderr == ""
+    assert json.loads(done.stdout)["position"] == pytest.approx(1.0, abs=0.011)

@@ -7,6 +7,9 @@ from typing import Any
 
 import pytest
 
+from rds.bus import SerialHost, SerialPort
+from rds.bus.hub.bus_settings import DEFAULT_BAUD
+from rds.bus.modules.server_process import end_server, start_server
 from rds.bus.tools.link import bus_name
 from rds.core.errors import MachineError
 from rds.panels.jog.state import Jog
@@ -58,3 +61,20 @@ def test_channel_0_of_the_built_in_bus_is_not_the_machine_s(tmp_path: Path, open
     session.emergency_stop()
     assert [call["channel"] for call in opened] == ["0"]
     assert bus_name("virtual", 0) == "virtual:0"
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("bus", [{}, {"interface": "serial"}, {"dialect": "dcs", "channel": "starmill"}])
+def test_the_emergency_stop_reaches_units_on_a_serial_line(alone: Path, bus: dict[str, Any]) -> None:
+    """It looked for them on the built-in bus, or took the line for one of python-can's."""
+    server = start_server("dcs", "starmill", "starmill")
+    port = SerialPort("starmill", DEFAULT_BAUD)
+    try:
+        host = SerialHost(port, DEFAULT_BAUD, {2: "X"})
+        host.jog(2, 5)
+        said = Session(alone, "starmill", bus).emergency_stop()
+        assert said == "emergency stop: 4 units on the serial line stand; home the machine"
+        assert "no module is on the bus" in Session(alone, "starmill", bus).release_emergency_stop()
+    finally:
+        port.close()
+        end_server(server)

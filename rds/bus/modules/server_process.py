@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from rds.bus.modules.dialects import server_module
+from rds.bus.modules.dialects import SERIAL_DIALECTS, server_module
 from rds.core.errors import MachineError
 from rds.core.exit_code import how_it_ended
 
@@ -55,7 +55,8 @@ def start_server(
             said.seek(0)
             last = said.read().decode(errors="replace").strip().splitlines()[-1:]
             why = "".join(last) or f"its process {how_it_ended(server.returncode)}"
-            raise MachineError(f"the machine on the built-in bus did not start: {why}")
+            where = "a serial line" if dialect in SERIAL_DIALECTS else "the built-in bus"
+            raise MachineError(f"the machine on {where} did not start: {why}")
     return server
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from rds.bus.hub.bus_settings import SERIAL, bus_fault, serial_fault
 from rds.bus.medium.fault_file import read_faults
-from rds.bus.modules.dialects import SERIAL_DIALECTS
+from rds.bus.modules.dialects import SERIAL_DIALECTS, bus_interface
 from rds.core.errors import InputError
 from rds.core.quantities import Choice
 from rds.core.toml_table import TomlTable
@@ -18,20 +18,22 @@ from rds.modes.loop.commands import Command
 from rds.modes.process.machine import BUILTIN
 
 
-def bus_table(words: TomlTable, folder: Path) -> dict[str, Any]:
+def bus_table(words: TomlTable, folder: Path, machine: Machine | None = None) -> dict[str, Any]:
     """The keyword arguments of can.Bus; python-can itself knows which options an interface has.
 
-    On the built-in bus also "faults", the schedule that is injected during the run.
+    On the built-in bus also "faults", the schedule that is injected during the run. Where neither interface nor dialect
+    is said, a `machine` whose modules are units of a serial line is there.
     """
     table = words.inner("bus")
+    units = machine is not None and bus_interface(machine, {} if table is None else table.table) == SERIAL
     if table is None:
-        return {}
+        return {"interface": SERIAL, "dialect": SERIAL_DIALECTS[0]} if units else {}
     interface = table.read("interface")
     channel = table.any("channel")
     if channel is not None and (isinstance(channel, bool) or not isinstance(channel, str | int)):
         raise table.fault("channel", "must be the name or the number of a channel")
     dialect = table.read("dialect")
-    if dialect in SERIAL_DIALECTS or (interface == SERIAL and "dialect" not in table):
+    if units or dialect in SERIAL_DIALECTS or (interface == SERIAL and "dialect" not in table):
         if (wrong := serial_fault(table.table)) is not None:
             raise table.fault(*wrong)
         return {**table.table, "interface": SERIAL, "dialect": SERIAL_DIALECTS[0]}

@@ -68,7 +68,7 @@ def resolve(
     driven = _drive(words, mode) if program is None else _program(words, mode)
     if drawn is not None:
         driven = "program"
-    bus = bus_table(words, folder)
+    bus = bus_table(words, folder, machine)
     axes, periods, notes = [], {}, []
     every = _axes(words, machine) if program is None else _program_axes(words, machine, program)
     commands = bus_commands(words, bus, machine, [axis.name for axis, _ in every], driven)

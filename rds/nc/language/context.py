@@ -92,7 +92,9 @@ def check_feed(m: Context, words: dict[str, float], key: str) -> None:
     elif state.feed_rate == 0.0:
         if m.dialect.default_feed and state.feed_mode == PER_MINUTE:
             return
-        unit = "units per revolution" if state.feed_mode == PER_REVOLUTION else "units per minute"
-        raise Fault(f"no feed rate is set; write F, in {unit}", key)
+        if state.feed_mode == PER_REVOLUTION:
+            raise Fault("no feed rate is set; write F, in units per revolution", key)
+        own = "or take the machine's own (`--with default-feed`)"
+        raise Fault(f"no feed rate is set; write F, in units per minute, {own}", key)
     elif state.feed_mode == PER_REVOLUTION and state.speed == 0.0:
         raise Fault("a feed per revolution (G95) and the spindle's speed is 0; write S", key)

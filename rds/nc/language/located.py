@@ -22,7 +22,7 @@ _SCRIPT_IS_OFF = "this is a line of a configuration script; read the program wit
 def as_it_is_meant(fault: Fault, raw: bytes, text: str, options: Dialect) -> Fault:
     """The fault of a line `raw`, which is `text`; where it is of another language, told by its name."""
     if _SCRIPT.match(text):
-        return Fault(_NO_SCRIPT if options.ncc else _SCRIPT_IS_OFF, at=0)
+        return Fault(_NO_SCRIPT if options.ncc else _SCRIPT_IS_OFF)  # of the line: its words mean nothing here
     if _FANUC_MACRO.match(text):
         return Fault(FANUC_MACRO)
     return Fault(OLD_LINE_ENDS) if b"\r" in raw.strip() else fault

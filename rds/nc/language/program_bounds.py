@@ -86,10 +86,11 @@ class Bounds:
                 said = "the program has no M2, M30 or %: its last line is taken for its end (option open-end)"
                 self._remark(ProgramError(said, file=source.name, line=source.line))
             return
-        what = "%" if self.percent else "M2, M30 or % (then with % on the first line, too)"
-        raise ProgramError(
-            f"the program does not end; write {what} on its last line", file=source.name, line=source.line
-        )
+        what = "% on its last line"
+        if not self.percent:
+            own = "or let its last line be its end (`--with open-end`)"
+            what = f"M2, M30 or % (then with % on the first line, too) on its last line, {own}"
+        raise ProgramError(f"the program does not end; write {what}", file=source.name, line=source.line)
 
     def percent_sign(self) -> bool:
         """% ends a program that began with one; in a subroutine's file that is being searched it says nothing."""

@@ -71,7 +71,7 @@ def _losses(run: MethodRun) -> list[str]:
     said, course = [], run.course
     if course.late > _LATE * course.steps:
         said.append(
-            f"Method {run.method}: the host sent {course.late} of {course.steps} frames late, which made steps longer "
+            f"Method {run.method}: the host sent {course.late} of {course.steps} frames late, which makes steps longer "
             "and shorter than planned: see to what else keeps this computer busy, or take B or C, which go by the "
             "nodes' clocks."
         )
@@ -81,7 +81,8 @@ def _losses(run: MethodRun) -> list[str]:
             "missed): frames were damaged or lost on the line. Home the axes; see to the cable, its shield and the "
             "baud rate, or take B or C, which send again what is lost."
         )
-    motors = {name: count - run.astray.get(name, 0) for name, count in run.lost.items()}
+    steppers = {name: count for name, count in run.lost.items() if name in run.astray}  # servo motors have encoders
+    motors = {name: count - run.astray[name] for name, count in steppers.items()}
     if lost := _counts(motors):
         said.append(f"Method {run.method} ends with steps lost by motors: {lost}; nobody on the line knows.")
     return said

@@ -135,6 +135,12 @@ def measure_clocks(
     loaded = load_machine(machine)
     if len(loaded.axes) < 2:
         raise InputError(f"machine {loaded.name} has one axis; clocks that run apart take two", loaded.path)
+    if any(axis.module.get("motor") == "stepper" for axis in loaded.axes.values()):
+        raise InputError(
+            f"{loaded.name} has units on a serial line, which tell no clocks; what drift costs their motion, "
+            "`rds nc run FILE --method B,B-free --option drift=X:50` says",
+            loaded.path,
+        )
     place = default_channel(loaded, interface, channel)
     if drift is not None:
         drifts(drift, loaded)

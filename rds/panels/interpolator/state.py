@@ -124,10 +124,9 @@ class Interpolating:
         program = self._program_path() if self.choices["given"] in (BUNDLED, PROGRAM) else None
         segments = [] if program is not None else self.segments()
         acceleration, chosen = self._acceleration(), self.choices.values()
-        of_rds = (
-            chosen["given"] == BUNDLED
-        )  # its axes, travels and speeds are those of the machine that it was made for
-        machine = find_bundled(chosen["bundled"]).machine if of_rds else self.session.machine
+        machine = self.session.machine
+        if chosen["given"] == BUNDLED:  # its axes, travels and speeds are those of the machine that it was made for
+            machine = find_bundled(chosen["bundled"]).machine
         for file in files:
             keep_file(file, f"interpolated with a feed of {chosen['feed']:g} {chosen['feed_unit']}")
 

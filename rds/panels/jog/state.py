@@ -214,7 +214,7 @@ class Jog:
     def _let_go(self) -> None:
         ends, self._ends = self._ends, []
         self._loop = None  # first: that it ends now is no error
-        for end in ends:
+        for end in reversed(ends):  # the loop before the modules that it tells to stand
             end()
         self._server = None
         self.positions, self.speeds, self.moving, self.homing = {}, {}, False, ""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from rds.bus.hub.bus_settings import DEFAULT_BAUD, SERIAL
 from rds.bus.tools.link import BUILTIN, bus_options
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError, MachineError
@@ -216,7 +217,9 @@ class Session:
                     user.stop()
             for run in self.runs_that_go_on():
                 run.stop()
-        if stopped:
+        if stopped and self._line() is not None:
+            text = f"emergency stop: {len(stopped)} units on the serial line stand; home the machine"
+        elif stopped:
             text = f"emergency stop: {len(stopped)} modules are at zero volts and stay so until they are released"
         else:
             text = (
@@ -242,22 +245,45 @@ class Session:
 
         from rds.bus.tools.estop import stop_everything
 
+        line = self._line()
         channels = self._channels()
-        with ThreadPoolExecutor(max(len(channels), 1)) as pool:  # none waits for another's answers, or fails with it
-            asked = [pool.submit(self._on, channel, stop_everything) for channel in channels]
+        with ThreadPoolExecutor(len(channels) + 1) as pool:  # none waits for another's answers, or fails with it
+            asked = [] if line is None else [pool.submit(self._stop_units, line)]
+            asked += [pool.submit(self._on, channel, stop_everything) for channel in channels]
         stopped = [node for each in asked for node in each.result()]
-        if self.interface == BUILTIN and self._own is None:  # nobody may believe that it was stopped
+        if line is None and self.interface == BUILTIN and self._own is None:  # nobody may believe that it was stopped
             raise MachineError(
                 f"emergency stop: {self.machine} cannot be read, so the channel of its modules is not known; "
                 "cut the power, or correct the file and press again"
             )
         return stopped
 
+    def _line(self) -> str | None:
+        """The serial line that the machine's units are on; None where its modules are on CAN."""
+        from rds.bus.modules.dialects import SERIAL_DIALECTS, bus_interface
+        from rds.machines import load_machine
+
+        with contextlib.suppress(Exception):  # a broken file: what there was before is stopped on the built-in bus
+            machine = load_machine(self.machine)
+            dialect = self.bus.get("dialect", SERIAL_DIALECTS[0])
+            if dialect in SERIAL_DIALECTS and bus_interface(machine, self.bus) == SERIAL:
+                return str(self.bus.get("channel") or machine.name)
+        return None
+
+    def _stop_units(self, line: str) -> list[int]:
+        """Those on the line of a served machine, or behind a port; who is on a run's own line stops with the run."""
+        from rds.bus.modules.dcs.port import is_device, is_there
+        from rds.bus.modules.dcs.scan import stop_channel
+
+        there = is_device(line) or is_there(line)
+        return stop_channel(line, float(self.bus.get("baud", DEFAULT_BAUD))) if there else []
+
     def _channels(self) -> list[str | None]:
         """Where modules of this session, or of a run in its folder, may be: the machine's own channel first."""
-        if self.interface != BUILTIN:
+        line = self._line()
+        if line is None and self.interface != BUILTIN:
             return [self.bus.get("channel")]
-        own = [] if (channel := self._own_channel()) is None else [channel]
+        own = [] if line is not None or (channel := self._own_channel()) is None else [channel]
         runs = {channel for run in self.runs_that_go_on() if (channel := run.channel) is not None}
         return [*own, *sorted((self.channels | runs).difference(own))]
 
@@ -276,8 +302,9 @@ class Session:
         from rds.bus.tools.link import open_bus
 
         # the built-in bus takes whoever comes as it is, also where a run has given it another timing
-        options = {} if self.interface == BUILTIN else self.bus_options
-        with open_bus(self.interface, channel, **options) as bus:
+        interface = self.interface if self._line() is None else BUILTIN
+        options = {} if interface == BUILTIN else self.bus_options
+        with open_bus(interface, channel, **options) as bus:
             return act(bus)
 
     # runs

@@ -20,7 +20,7 @@ OPTIONS = ("baud", *OF_OWN_LINE)
 def make_units(machine: Machine, baud: float, start: float, drift: Mapping[str, float], gap: float) -> list[Unit]:
     """A unit for each axis. InputError for a machine that a line cannot have: more than six axes, units above 15."""
     if len(machine.axes) > SLOTS:
-        raise InputError(f"{len(machine.axes)} axes; one frame carries the commands of {SLOTS}", machine.path)
+        raise InputError(f"{len(machine.axes)} axes; a frame has places for {SLOTS}; serve it on CAN", machine.path)
     units = []
     for slot, axis in enumerate(machine.axes.values()):
         if axis.node not in UNITS:

@@ -83,7 +83,7 @@ class DcsDrivers(drivers_base.DriversBase[_Unit, Answer]):
     ):
         names = list(machine.axes)
         if len(names) > frames.SLOTS:
-            raise InputError(f"{len(names)} axes; one frame carries the commands of {frames.SLOTS}", machine.path)
+            raise InputError(f"{len(names)} axes; a frame has places for {frames.SLOTS}; serve it on CAN", machine.path)
         used = [machine.axis(name) for name in (names if axes is None else axes)]
         self._slots = [names.index(axis.name) for axis in used]
         for axis in used:
