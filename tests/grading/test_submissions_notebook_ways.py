@@ -132,6 +132,7 @@ def test_what_cannot_be_followed_is_refused_in_words(cell: str, said: str) -> No
         "from functools import partial\nrun = partial(rds.run, controller=control, params=params)\nrun(frequency=1.0).plot()",
         "for name, value in params.items():\n    print(name, value)\n1 / 0",
         'import pandas as pd\ndf = pd.DataFrame({"Kp": [1.0, 2.0]})\ndf["rms"] = [rds.run(params={**params, "Kp": k}).rms for k in df["Kp"]]',
+        'import sys\nif "google.colab" in sys.modules:\n    !pip install rds',
         "def simulate(law, params):\n    ys = []\n    for k in range(9):\n        ys.append(law(0.0, 0.0, 1.0, None, params))\n    return ys\nys = simulate(control, params)",
     ],
 )

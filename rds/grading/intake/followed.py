@@ -83,12 +83,15 @@ def names_in(node: ast.AST) -> set[str]:
 
 def namespaces_in(statement: ast.stmt) -> str:
     """The function by which a statement reaches names that its text does not say; "" if it has none."""
+    tested = {id(each) for node in ast.walk(statement) if isinstance(node, ast.Compare) for each in node.comparators}
     for node in ast.walk(statement):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _NAMESPACES:
             return f"{node.func.id}()"
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "vars" and not node.args:
             return "vars()"
         if isinstance(node, ast.Attribute) and node.attr in ("run_cell", "modules") and root(node):
+            if id(node) in tested:
+                continue  # `if "google.colab" in sys.modules` reaches nothing
             return f"{root(node)}.{node.attr}"
         if isinstance(node, ast.Import) and any(alias.name in ("__main__", "builtins") for alias in node.names):
             return f"import {node.names[0].name}"
