@@ -25,7 +25,7 @@ _DEVICES = ("/dev/null", "/dev/random", "/dev/urandom")  # not zero: mapped, it 
 _LIBRARIES = ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/etc/ld.so.cache")
 _ENVIRONMENT = {
     "HOME": "/tmp",
-    "LANG": "C.UTF-8",
+    "LANG": "C",  # whose data are in no file, so that setlocale(LC_ALL, "") finds it; texts are UTF-8 by -X utf8
     "LD_LIBRARY_PATH": f"{PREFIX}/lib",  # of a prefix of its own: its libraries lie elsewhere than they were built for
     "MPLBACKEND": "Agg",
     "MPLCONFIGDIR": "/tmp",
