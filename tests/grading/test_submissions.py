@@ -231,6 +231,12 @@ def test_brightspace_s_download_has_the_newest_attempt_of_each_student(form: str
     assert "cannot be understood ('9 févr. 2026 1012')" in found["Cy_114"].notes[0]
 
 
+def test_nobody_hands_in_earlier_by_a_name_in_brightspace(tmp_path: Path) -> None:
+    files: dict[str, str | bytes] = {"111-67890 - Eve - Jan 1, 2020 100 AM - Jan 5, 2026 1012 AM/controller.py": ""}
+    found = rows(collect(zipped(tmp_path / "all.zip", files), ACCEPTED, zone=CET))
+    assert found["Eve - Jan 1, 2020 100 AM_111"].time == datetime(2026, 1, 5, 10, 12, tzinfo=CET)
+
+
 @pytest.mark.parametrize("around", ["", "Submitted files/", "Student Work/Submitted files/"])
 @pytest.mark.parametrize("others", [{"Ben/Task/Version 1/controller.py": "only"}, {}])
 def test_the_last_version_of_teams_counts(around: str, others: dict[str, str], tmp_path: Path) -> None:
@@ -292,6 +298,20 @@ def test_gradescope_s_zip_takes_the_newest(tmp_path: Path) -> None:
     assert found["0042"].time == datetime(2026, 1, 9, 10, 0, 0, 500000, UTC)
     assert found["0042"].source["email"] == "ada@example.edu"
     assert [each["name"] for each in found["ben@example.edu"].source["members"]] == ["Ben\\nOdd", "Cy"]
+
+
+def test_nobody_is_graded_in_another_s_place_by_a_student_id(tmp_path: Path) -> None:
+    """Users of Gradescope write their student ID themselves."""
+    about = GRADESCOPE.replace("ada@example.edu", "eve@example.edu", 1)
+    files: dict[str, str | bytes] = {
+        "export/submission_metadata.yml": about,
+        "export/submission_1/controller.py": "eve",
+        "export/submission_2/controller.py": "ada",
+    }
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert list(found) == ["0042 (ada@example.edu)", "0042 (eve@example.edu)"]
+    assert [each.read() for each in found.values()] == [b"ada", b"eve"]
+    assert found["0042 (ada@example.edu)"].notes == ("somebody else has the same student ID (0042)",)
 
 
 @pytest.mark.parametrize("text", ["[", "- 1", "a: 1", "!!python/object/apply:os.system [id]", "x: &a [*a]"])
