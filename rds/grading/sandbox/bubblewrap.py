@@ -14,7 +14,8 @@ PREFIX = "/opt/python"
 """Where an interpreter is that is not the system's: its own place can be one that the sandbox uses itself, as /tmp."""
 
 ROOMS = (
-    *("__init__.py", "core", "checks", "models", "modes", "machines"),
+    *("__init__.py", "core", "checks", "modes", "machines"),
+    *(f"models/{name}.py" for name in ("__init__", "ode", "student")),  # that run a model, and are none
     *(f"network/{name}.py" for name in ("__init__", "delays", "distributions", "links")),  # which a plan may have
     *("grading/__init__.py", "grading/grade.py", "grading/sandbox"),
 )
