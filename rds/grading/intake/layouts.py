@@ -254,8 +254,9 @@ class _Sorting:
     def brightspace(self, items: Sequence[Item], folders: Sequence[str]) -> None:
         """A folder, or a file, for each attempt; who has one name and two numbers is told so."""
         numbers: dict[str, set[str]] = {}
+        in_folders = frozenset(folders)
         for name in [*folders, *(item.name for item in items if len(item.parts) == 1)]:
-            if found := (_BRIGHTSPACE_FOLDER if name in folders else _BRIGHTSPACE).fullmatch(name):
+            if found := (_BRIGHTSPACE_FOLDER if name in in_folders else _BRIGHTSPACE).fullmatch(name):
                 numbers.setdefault(found["name"], set()).add(found["user"])
 
         def of(found: re.Match[str]) -> StudentFiles:
