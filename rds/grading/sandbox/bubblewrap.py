@@ -22,6 +22,9 @@ ROOMS = (
 """What of this package is visible inside: the fixed interfaces. The laws and methods of the library are not: to write
 such a thing is what an assignment asks for."""
 
+_METHODS = ("machines/kinematics", "machines/forces")
+"""Folders of these rooms that hold methods: they are empty inside."""
+
 _DEVICES = ("/dev/null", "/dev/random", "/dev/urandom")  # not zero: mapped, it is memory that nobody counts
 _LIBRARIES = ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/etc/ld.so.cache")
 _ENVIRONMENT = {
@@ -58,7 +61,8 @@ def view() -> View:
 
     packages = [Bind(path, f"{SITE}/{name}") for name, path in package_paths().items()]
     interpreter = _interpreter()
-    return View([*interpreter.binds, *_sources(), *packages], interpreter.hidden)
+    methods = [f"{SOURCES}/rds/{name}" for name in _METHODS]
+    return View([*interpreter.binds, *_sources(), *packages], [*interpreter.hidden, *methods])
 
 
 def command(
