@@ -445,6 +445,19 @@ def test_a_file_that_turns_into_a_link_is_not_followed(tmp_path: Path) -> None:
         row.read()
 
 
+@pytest.mark.skipif(os.open not in os.supports_dir_fd, reason="folders are opened one by one on POSIX alone")
+@pytest.mark.parametrize("folder", ["ada", "ada/part"])
+def test_a_folder_that_turns_into_a_link_is_not_followed(folder: str, tmp_path: Path) -> None:
+    """A student who owns the folder could hand in the instructor's solution, which lies elsewhere."""
+    put(tmp_path, {"in/ada/part/controller.py": "x", "task/part/controller.py": "y", "task/controller.py": "y"})
+    row = of(tmp_path / "in")["ada"]
+    assert row.read() == b"x"
+    (tmp_path / "in" / folder).rename(tmp_path / "away")
+    (tmp_path / "in" / folder).symlink_to(tmp_path / "task")
+    with pytest.raises(Refusal, match="cannot be opened"):
+        row.read()
+
+
 def test_a_file_of_a_gigabyte_is_not_read(tmp_path: Path) -> None:
     with open(tmp_path / "ada.py", "wb") as file:
         file.truncate(1 << 30)
