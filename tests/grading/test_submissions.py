@@ -82,6 +82,8 @@ def test_nbgrader_s_tree_with_its_time(tmp_path: Path) -> None:
         ("2026-01-09 10:00:00", 10),
         ("2026-01-09 10:00:00 CST", None),  # America's or China's
         ("2026-01-09 10:00:00 Mars/Phobos", None),
+        ("0001-01-01 00:00:00 +1400", None),  # before the first year of UTC, in which gradebooks have it
+        ("9999-12-31 23:59:59 -1400", None),
         ("yesterday", None),
         ("", None),
     ],
@@ -337,6 +339,7 @@ def test_times_of_the_instructor(tmp_path: Path) -> None:
         ("who,when\n", "columns student and timestamp"),
         ("student,timestamp\nzoe,2026-01-10\n", "line 2: student 'zoe' handed nothing in"),
         ("student,timestamp\nada,soon\n", "line 2: timestamp = 'soon' is no time"),
+        ("student,timestamp\nada,0001-01-01T00:00:00+14:00\n", "line 2: timestamp = .* is no time"),
         ("student,timestamp\nada,2026-01-10\nada,2026-01-12\n", "line 3: student 'ada' has a line above already"),
     ],
 )
