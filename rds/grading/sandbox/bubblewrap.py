@@ -23,7 +23,7 @@ ROOMS = (
 such a thing is what an assignment asks for."""
 
 _METHODS = ("machines/kinematics", "machines/forces")
-"""Folders of these rooms that hold methods: they are empty inside."""
+"""What holds methods in one of these rooms: it is not visible."""
 
 _DEVICES = ("/dev/null", "/dev/random", "/dev/urandom")  # not zero: mapped, it is memory that nobody counts
 _LIBRARIES = ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/etc/ld.so.cache")
@@ -61,8 +61,7 @@ def view() -> View:
 
     packages = [Bind(path, f"{SITE}/{name}") for name, path in package_paths().items()]
     interpreter = _interpreter()
-    methods = [f"{SOURCES}/rds/{name}" for name in _METHODS]
-    return View([*interpreter.binds, *_sources(), *packages], [*interpreter.hidden, *methods])
+    return View([*interpreter.binds, *_sources(), *packages], interpreter.hidden)
 
 
 def command(
@@ -174,4 +173,11 @@ def _links() -> list[str]:
 
 def _sources() -> list[Bind]:
     package = Path(__file__).resolve().parents[2]
-    return [Bind(package / name, f"{SOURCES}/rds/{name}") for name in ROOMS]
+    names: list[str] = []
+    for room in ROOMS:
+        if any(name.startswith(f"{room}/") for name in _METHODS):  # an empty folder could be imported
+            inside = {f"{room}/{each.name}" for each in (package / room).iterdir() if each.name != "__pycache__"}
+            names += sorted(inside - set(_METHODS))
+        else:
+            names.append(room)
+    return [Bind(package / name, f"{SOURCES}/rds/{name}") for name in names]
