@@ -13,7 +13,8 @@ from rds.core.types import Model
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.trusted import TrustedFiles
 from rds.grading.batch.grade_one import Opened
-from rds.grading.criteria.linear import LinearLoop, NoLoop
+from rds.grading.criteria.law_fit import LawFit
+from rds.grading.criteria.linear import LinearLoop, NoLoop, closed
 from rds.identification.robustness.margins import linear_law, loop_margins
 from rds.models import library_model
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
@@ -106,3 +107,12 @@ def test_who_answers_otherwise_in_a_second_run_is_for_a_review_unless_a_relay(
     law = f"import os\ndef control(t, r, y, state, params):\n    return {voltage} + os.urandom(1)[0] / 1e4, state\n"
     found, _ = found_in(tmp_path, law)
     assert isinstance(found, NoLoop) and found.is_known == is_known and "a seed" in found.why, found
+
+
+@pytest.mark.parametrize("gain", [1e3, 1e6, 1e12, 1e300])
+def test_a_loop_that_grows_within_a_few_samples_has_no_margins(gain: float) -> None:
+    """A cubic law under a force is such a loop, and was a fault of the grader's own."""
+    fit = LawFit(np.array([1.0]), np.array([gain]), 0.0)
+    found = closed(fit, library_model("linear-axis", tau=0.01, K=1.7), 1e-3)
+    assert isinstance(found, NoLoop)
+    assert found.is_known

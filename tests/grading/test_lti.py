@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+import socket
+import struct
 import threading
 import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from email.message import Message
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
@@ -21,6 +24,7 @@ from rds.grading.exports.export import export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.intake import collect
 from rds.grading.lti.registration import read_registration
+from rds.grading.lti.tool import _multipart
 from tests.grading.grades import batch_in, grade
 
 jwt = pytest.importorskip("jwt", reason="pylti1p3next is not installed: pip install '.[lti]'")
@@ -238,3 +242,75 @@ def test_a_registration_without_https_is_refused(tmp_path: Path) -> None:
     (tmp_path / "lti.toml").write_text("\n".join(lines))
     with pytest.raises(InputError, match="must begin with https"):
         read_registration(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        b'Content-Disposition: form-data; name=file; filename="' + b"=?utf-8?q?a?= " * 10_000 + b'.py"\r\n\r\nx',
+        b"Content-Disposition: form-data" + b"; a=b" * 100_000 + b"\r\n\r\nx",
+        b"".join(b"Content-Type: multipart/mixed; boundary=b%d\r\n\r\n--b%d\r\n" % (n, n) for n in range(20_000)),
+        b"\r\n\r\n--b\r\n" * 200_000,
+    ],
+    ids=["encoded words", "parameters", "forms in forms", "parts"],
+)
+def test_a_form_that_is_made_to_take_long_is_refused_at_once(part: bytes) -> None:
+    """Anybody can send one: a few hundred kB took a minute and 3 GB, or a traceback."""
+    headers = Message()
+    headers["Content-Type"] = "multipart/form-data; boundary=b"
+    began = time.process_time()
+    with pytest.raises(InputError, match="no file came with it"):
+        _multipart(headers, b"--b\r\n" + part + b"\r\n--b--\r\n")
+    assert time.process_time() - began < 1.0
+
+
+def test_a_form_of_a_browser_is_read_to_the_byte() -> None:
+    headers = Message()
+    headers["Content-Type"] = "multipart/form-data; boundary=----WebKitFormBoundary7MA4YWxkTrZu0gW"
+    data = b"--b\r\nx = '\xc3\xbc'\r\n\r\n--\r\n"
+    body = b"------WebKitFormBoundary7MA4YWxkTrZu0gW\r\n".join(
+        [
+            b"",
+            b'Content-Disposition: form-data; name="pass"\r\n\r\nword\r\n',
+            'Content-Disposition: form-data; name="file"; filename="Übung (1) %22.py"\r\n'.encode()
+            + b"Content-Type: text/x-python\r\n\r\n"
+            + data,
+        ]
+    )
+    body += b"\r\n------WebKitFormBoundary7MA4YWxkTrZu0gW--\r\n"
+    assert _multipart(headers, body) == ({"pass": "word"}, "Übung (1) %22.py", data)
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"POST http://[x/hand-in HTTP/1.1\r\nContent-Length: 0\r\n\r\n",
+        b"POST /hand-in HTTP/1.1\r\nContent-Length: " + b"9" * 5000 + b"\r\n\r\n",
+        b"POST /hand-in HTTP/1.1\r\nContent-Length: 1000\r\n\r\nabc",
+    ],
+    ids=["no address", "a length of 5000 digits", "gone before its end"],
+)
+def test_what_anybody_sends_is_no_fault_of_the_tool(
+    sent: bytes, course: Course, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    faults: list[Any] = []
+    monkeypatch.setattr(course.server, "handle_error", lambda *about: faults.append(about))
+    with socket.create_connection(course.server.server_address[:2]) as browser:  # type: ignore[arg-type]
+        browser.sendall(sent)
+        if b"abc" in sent:
+            time.sleep(0.1)  # until the rest of it is waited for
+            browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # cut off at once
+        else:
+            assert b" 40" in browser.recv(100)
+    time.sleep(0.2)
+    assert not faults
+
+
+def test_nobody_takes_the_place_of_another_by_an_e_mail_address(course: Course) -> None:
+    """Users of some platforms write their address themselves."""
+    for user, text in (("user-7", b"ada = 1"), ("user-8", b"eve = 1"), ("user-7", b"ada = 2")):
+        asked, cookie = course.login()
+        _, page = course.launch(course.platform.token(asked["nonce"], sub=user), asked["state"], cookie)
+        (word,) = re.findall(r'name="pass" value="([^"]+)"', page)
+        assert course.hand_in(word, "law.py", text)[0] == 200
+    assert sorted(row.read() for row in collect(course.folder / "in").rows) == [b"ada = 2", b"eve = 1"]

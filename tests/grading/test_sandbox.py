@@ -143,6 +143,30 @@ def fails(): return 1 / 0
         assert subject.call("table", [0, 0])["sum"] == 0  # and the next call is answered
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from __future__ import annotations\nfrom dataclasses import dataclass\n@dataclass\nclass G:\n    k: int = 2",
+        "import pickle\nclass G:\n    pass\npickle.loads(pickle.dumps(G()))",
+        "import sys\nme = sys.modules[__name__]",
+        "import locale\nlocale.setlocale(locale.LC_ALL, '')",
+    ],
+)
+def test_a_file_of_functions_is_a_module_like_others(text: str, pool: Pool, written: Callable[..., Path]) -> None:
+    with pool.open(written(f"{text}\ndef two(): return 2.0\n", ""), kind="functions") as subject:
+        assert subject.call("two") == 2.0
+
+
+@pytest.mark.parametrize("value", ["Fraction(1, 2)", "np.longdouble(0.5)", "Own(0.5)", "[Fraction(1, 2)][0]"])
+def test_a_number_of_whatever_class_is_a_number(value: str, pool: Pool, written: Callable[..., Path]) -> None:
+    text = f"import numpy as np\nfrom fractions import Fraction\nclass Own(float): pass\ndef half(): return {value}\n"
+    text += "def huge(): return Fraction(10 ** 400, 3)\n"
+    with pool.open(written(text, ""), kind="functions") as subject:
+        assert subject.call("half") == 0.5
+        with pytest.raises(SubmissionError, match="a Fraction beyond what a float can be"):
+            subject.call("huge")
+
+
 def test_nothing_of_one_case_is_left_for_the_next(pool: Pool, written: Callable[..., Path]) -> None:
     text = """
 import builtins, os, tempfile

@@ -17,6 +17,7 @@ from rds.grading.batch.similarity import (
     LEAST_COMMON,
     LEAST_SCORE,
     WINDOW,
+    Fingerprints,
     Program,
     fingerprints,
     identical_files,
@@ -114,6 +115,15 @@ def test_what_most_of_a_class_have_is_no_sign() -> None:
 @pytest.mark.parametrize("code", ["", "def (", "\0", "(" * 9999, "x = 1", "-" * 5000 + "1"])
 def test_code_that_is_none_has_no_pairs(code: str) -> None:
     assert not similar_pairs(prints(ada=code, ben=code))
+
+
+def test_a_line_that_is_nearly_too_deep_hides_nothing() -> None:
+    """It could be read in the sandbox, but not from deep in the stack: a copy with such a line was like nothing."""
+
+    def deep(frames: int) -> Fingerprints:
+        return fingerprints(f"{LAW}\nx = {'+'.join(['1'] * 2800)}\n".encode()) if not frames else deep(frames - 1)
+
+    assert len(deep(100)) > LEAST_COMMON
 
 
 @given(st.lists(st.sampled_from("abcdefgh"), max_size=25), st.lists(st.sampled_from("abcdefgh"), max_size=25))

@@ -82,6 +82,8 @@ def test_nbgrader_s_tree_with_its_time(tmp_path: Path) -> None:
         ("2026-01-09 10:00:00", 10),
         ("2026-01-09 10:00:00 CST", None),  # America's or China's
         ("2026-01-09 10:00:00 Mars/Phobos", None),
+        ("0001-01-01 00:00:00 +1400", None),  # before the first year of UTC, in which gradebooks have it
+        ("9999-12-31 23:59:59 -1400", None),
         ("yesterday", None),
         ("", None),
     ],
@@ -231,6 +233,12 @@ def test_brightspace_s_download_has_the_newest_attempt_of_each_student(form: str
     assert "cannot be understood ('9 févr. 2026 1012')" in found["Cy_114"].notes[0]
 
 
+def test_nobody_hands_in_earlier_by_a_name_in_brightspace(tmp_path: Path) -> None:
+    files: dict[str, str | bytes] = {"111-67890 - Eve - Jan 1, 2020 100 AM - Jan 5, 2026 1012 AM/controller.py": ""}
+    found = rows(collect(zipped(tmp_path / "all.zip", files), ACCEPTED, zone=CET))
+    assert found["Eve - Jan 1, 2020 100 AM_111"].time == datetime(2026, 1, 5, 10, 12, tzinfo=CET)
+
+
 @pytest.mark.parametrize("around", ["", "Submitted files/", "Student Work/Submitted files/"])
 @pytest.mark.parametrize("others", [{"Ben/Task/Version 1/controller.py": "only"}, {}])
 def test_the_last_version_of_teams_counts(around: str, others: dict[str, str], tmp_path: Path) -> None:
@@ -294,6 +302,20 @@ def test_gradescope_s_zip_takes_the_newest(tmp_path: Path) -> None:
     assert [each["name"] for each in found["ben@example.edu"].source["members"]] == ["Ben\\nOdd", "Cy"]
 
 
+def test_nobody_is_graded_in_another_s_place_by_a_student_id(tmp_path: Path) -> None:
+    """Users of Gradescope write their student ID themselves."""
+    about = GRADESCOPE.replace("ada@example.edu", "eve@example.edu", 1)
+    files: dict[str, str | bytes] = {
+        "export/submission_metadata.yml": about,
+        "export/submission_1/controller.py": "eve",
+        "export/submission_2/controller.py": "ada",
+    }
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert list(found) == ["0042 (ada@example.edu)", "0042 (eve@example.edu)"]
+    assert [each.read() for each in found.values()] == [b"ada", b"eve"]
+    assert found["0042 (ada@example.edu)"].notes == ("somebody else has the same student ID (0042)",)
+
+
 @pytest.mark.parametrize("text", ["[", "- 1", "a: 1", "!!python/object/apply:os.system [id]", "x: &a [*a]"])
 def test_gradescope_metadata_that_is_none(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError, match=r"submission_metadata\.yml"):
@@ -317,6 +339,7 @@ def test_times_of_the_instructor(tmp_path: Path) -> None:
         ("who,when\n", "columns student and timestamp"),
         ("student,timestamp\nzoe,2026-01-10\n", "line 2: student 'zoe' handed nothing in"),
         ("student,timestamp\nada,soon\n", "line 2: timestamp = 'soon' is no time"),
+        ("student,timestamp\nada,0001-01-01T00:00:00+14:00\n", "line 2: timestamp = .* is no time"),
         ("student,timestamp\nada,2026-01-10\nada,2026-01-12\n", "line 3: student 'ada' has a line above already"),
     ],
 )
@@ -421,6 +444,19 @@ def test_a_file_that_turns_into_a_link_is_not_followed(tmp_path: Path) -> None:
     row = of(tmp_path / "in")["ada"]
     (tmp_path / "in/ada.py").unlink()
     (tmp_path / "in/ada.py").symlink_to(tmp_path / "secret")
+    with pytest.raises(Refusal, match="cannot be opened"):
+        row.read()
+
+
+@pytest.mark.skipif(os.open not in os.supports_dir_fd, reason="folders are opened one by one on POSIX alone")
+@pytest.mark.parametrize("folder", ["ada", "ada/part"])
+def test_a_folder_that_turns_into_a_link_is_not_followed(folder: str, tmp_path: Path) -> None:
+    """A student who owns the folder could hand in the instructor's solution, which lies elsewhere."""
+    put(tmp_path, {"in/ada/part/controller.py": "x", "task/part/controller.py": "y", "task/controller.py": "y"})
+    row = of(tmp_path / "in")["ada"]
+    assert row.read() == b"x"
+    (tmp_path / "in" / folder).rename(tmp_path / "away")
+    (tmp_path / "in" / folder).symlink_to(tmp_path / "task")
     with pytest.raises(Refusal, match="cannot be opened"):
         row.read()
 

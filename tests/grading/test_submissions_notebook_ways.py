@@ -102,6 +102,8 @@ def test_what_a_notebook_says_is_followed_in_little_memory() -> None:
         ('globals()["params"]["Kp"] = 30.0', "globals"),
         ('for n in ["Kp"]:\n    exec(f"params[{n!r}] = 30.0")', "exec"),
         ('eval("params.update(Kp=30.0)")', "eval"),
+        ("rds.run(exec('params[\"Kp\"] = 30.0'))", "exec"),
+        ("rds.run([globals().update(params={})])", "globals"),
         ('vars()["params"] = {"Kp": 30.0}', "vars"),
         ('import sys\nsetattr(sys.modules[__name__], "params", {"Kp": 30.0})', "sys.modules"),
         ('import __main__ as m\nm.params["Kp"] = 30.0', "import __main__"),
@@ -132,6 +134,8 @@ def test_what_cannot_be_followed_is_refused_in_words(cell: str, said: str) -> No
         "from functools import partial\nrun = partial(rds.run, controller=control, params=params)\nrun(frequency=1.0).plot()",
         "for name, value in params.items():\n    print(name, value)\n1 / 0",
         'import pandas as pd\ndf = pd.DataFrame({"Kp": [1.0, 2.0]})\ndf["rms"] = [rds.run(params={**params, "Kp": k}).rms for k in df["Kp"]]',
+        'import sys\nif "google.colab" in sys.modules:\n    !pip install rds',
+        "experiment = rds.Experiment(controller=globals(), duration=2.0)\nexperiment.run()\nrds.check(globals())",
         "def simulate(law, params):\n    ys = []\n    for k in range(9):\n        ys.append(law(0.0, 0.0, 1.0, None, params))\n    return ys\nys = simulate(control, params)",
     ],
 )

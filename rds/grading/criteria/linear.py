@@ -210,9 +210,11 @@ def closed(fit: LawFit, model: Model, T: float) -> LinearLoop | NoLoop:
     samples = _SHORT
     while True:
         loop = LinearLoop(*_answers(fit, model, T, samples), T)
+        if len(loop.position) < samples:  # of a loop that grows fast there may be a few only
+            return NoLoop(_GROWS, True)
         size = np.abs(loop.position).max()
         ends = [np.abs(part).max() for part in np.array_split(loop.position, 20)]
-        if len(loop.position) < samples or not np.isfinite(size):
+        if not np.isfinite(size):
             return NoLoop(_GROWS, True)
         if ends[-1] <= _GONE * size or (samples == _LONG and ends[-1] <= _LEFT * size):
             return loop

@@ -29,7 +29,7 @@ _KINDS = {
 def files_below(folder: Path) -> tuple[list[Item], list[str]]:
     """All files below `folder` in the order of their names, and the names of the folders just below it."""
     found: list[Item] = []
-    for item in _walk(folder, ()):
+    for item in _walk(folder, (), folder):
         found.append(item)
         if len(found) > MOST_FILES:
             largest, count = Counter(item.parts[0] for item in found).most_common(1)[0]
@@ -43,10 +43,13 @@ def files_below(folder: Path) -> tuple[list[Item], list[str]]:
     return found, [name for name in folders if not is_clutter((name,)) and not _looks_like_code(name)]
 
 
-def read_regular(path: str | Path, most: int) -> bytes:
-    """At most `most` bytes of a regular file; Refusal for anything else, Unreadable where the computer is at fault."""
+def read_regular(path: str | Path, most: int, within: Path | None = None) -> bytes:
+    """At most `most` bytes of a regular file; Refusal for anything else, Unreadable where the computer is at fault.
+
+    No link is followed, neither the file's own name nor a folder below `within`.
+    """
     try:
-        descriptor = os.open(path, UNFOLLOWED)
+        descriptor = _opened(path, within)
     except (OSError, ValueError) as error:
         said = error.strerror if isinstance(error, OSError) else str(error)
         raise _fault("it cannot be opened", said, isinstance(error, OSError) and error.errno in _NOT_FOR_US) from None
@@ -65,11 +68,27 @@ def read_regular(path: str | Path, most: int) -> bytes:
     return data
 
 
+def _opened(path: str | Path, within: Path | None) -> int:
+    """The descriptor. Folders are opened one by one: their owner may put a link in the place of one that was seen."""
+    if within is None or os.open not in os.supports_dir_fd:
+        return os.open(path, UNFOLLOWED)
+    *folders, name = Path(path).relative_to(within).parts
+    at = os.open(within, os.O_RDONLY)
+    try:
+        for each in folders:
+            inner = os.open(each, UNFOLLOWED, dir_fd=at)
+            os.close(at)
+            at = inner
+        return os.open(name, UNFOLLOWED, dir_fd=at)
+    finally:
+        os.close(at)
+
+
 def _fault(what: str, said: str | None, is_unreadable: bool) -> Refusal:
     return refusal(f"{what}: {said}; {_REMEDY}" if is_unreadable else f"{what}: {said}", is_unreadable)
 
 
-def _walk(folder: Path, parts: tuple[str, ...]) -> Iterator[Item]:
+def _walk(folder: Path, parts: tuple[str, ...], root: Path) -> Iterator[Item]:
     try:
         with os.scandir(folder) as entries:
             names = sorted(entries, key=lambda entry: os.fsencode(entry.name))
@@ -93,9 +112,9 @@ def _walk(folder: Path, parts: tuple[str, ...]) -> Iterator[Item]:
             elif len(inner) > DEEPEST:
                 yield faulty(inner, f"it lies more than {DEEPEST} folders deep")
             else:
-                yield from _walk(Path(entry.path), inner)
+                yield from _walk(Path(entry.path), inner, root)
         elif stat.S_ISREG(about.st_mode):
-            yield Item(inner, partial(read_regular, entry.path))  # its date is whoever copied it's
+            yield Item(inner, partial(read_regular, entry.path, within=root))  # its date is whoever copied it's
         else:
             kind = _KINDS.get(stat.S_IFMT(about.st_mode), "no regular file")
             yield faulty(inner, f"it is {kind}; hand in one Python file or notebook")

@@ -81,14 +81,29 @@ def names_in(node: ast.AST) -> set[str]:
     }
 
 
-def namespaces_in(statement: ast.stmt) -> str:
-    """The function by which a statement reaches names that its text does not say; "" if it has none."""
+def namespaces_in(statement: ast.stmt, absent: Set[str]) -> str:
+    """The function by which a statement reaches names that its text does not say; "" if it has none.
+
+    An experiment of a module that is `absent` there may be handed them, as in `Experiment(controller=globals())`.
+    """
+    tested = {id(each) for node in ast.walk(statement) if isinstance(node, ast.Compare) for each in node.comparators}
+    handed = {
+        id(each)
+        for node in ast.walk(statement)
+        if isinstance(node, ast.Call) and root(node.func) in absent
+        for each in (*node.args, *(word.value for word in node.keywords))
+        if isinstance(each, ast.Call) and not each.args
+    }
     for node in ast.walk(statement):
+        if id(node) in handed:
+            continue
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _NAMESPACES:
             return f"{node.func.id}()"
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "vars" and not node.args:
             return "vars()"
         if isinstance(node, ast.Attribute) and node.attr in ("run_cell", "modules") and root(node):
+            if id(node) in tested:
+                continue  # `if "google.colab" in sys.modules` reaches nothing
             return f"{root(node)}.{node.attr}"
         if isinstance(node, ast.Import) and any(alias.name in ("__main__", "builtins") for alias in node.names):
             return f"import {node.names[0].name}"

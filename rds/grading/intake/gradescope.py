@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib import import_module
 from typing import Any
@@ -22,6 +22,7 @@ class Submitter:
     student: str
     time: datetime | None
     source: dict[str, Any] = field(default_factory=dict)
+    note: str = ""
 
 
 def read_metadata(data: bytes) -> dict[str, Submitter]:
@@ -35,7 +36,27 @@ def read_metadata(data: bytes) -> dict[str, Submitter]:
         raise InputError(f"is not YAML: {str(error).splitlines()[0]}; export it once more", METADATA) from error
     if not isinstance(whole, Mapping):
         raise InputError("is no table of submissions; export it once more", METADATA)
-    return {str(folder): _submitter(str(folder), about) for folder, about in whole.items()}
+    return _apart({str(folder): _submitter(str(folder), about) for folder, about in whole.items()})
+
+
+def _apart(found: dict[str, Submitter]) -> dict[str, Submitter]:
+    """Whoever has the same number, but another e-mail address, is another student: users write their number themselves.
+
+    Else the newer submission would be graded in the place of the other one's.
+    """
+    people: dict[str, set[str]] = {}
+    for who in found.values():
+        people.setdefault(who.student, set()).add(who.source["email"].casefold())
+    return {
+        folder: replace(
+            who,
+            student=f"{who.student} ({who.source['email'] or folder})",
+            note=f"somebody else has the same student ID ({who.student})",
+        )
+        if len(people[who.student]) > 1
+        else who
+        for folder, who in found.items()
+    }
 
 
 def _submitter(folder: str, about: Any) -> Submitter:

@@ -41,10 +41,11 @@ _BLACKBOARD = re.compile(
     r"(?P<before>.+?_(?P<user>[^_]+))_attempt_(?P<time>\d{4}(?:-\d\d){5})(?:_(?P<file>.+)|\.txt)", re.DOTALL
 )
 # the first number is the user's, the second the assignment's; the hour and minute are written in one
-_BRIGHTSPACE = re.compile(
-    r"(?P<user>\d+)-\d+ - (?P<name>.+?) - (?P<time>(?:(?! - ).)*\d{3,4}(?: ?[AaPp]\.?[Mm]\.?)?)(?: - (?P<file>.+))?",
-    re.DOTALL,
+# of a folder, the time ends the name, whatever the student's own name is
+_BRIGHTSPACE_FOLDER = re.compile(
+    r"(?P<user>\d+)-\d+ - (?P<name>.+?) - (?P<time>(?:(?! - ).)*\d{3,4}(?: ?[AaPp]\.?[Mm]\.?)?)", re.DOTALL
 )
+_BRIGHTSPACE = re.compile(_BRIGHTSPACE_FOLDER.pattern + r"(?: - (?P<file>.+))?", re.DOTALL)
 _BRIGHTSPACE_TIMES = ("%b %d, %Y", "%B %d, %Y", "%d %b, %Y", "%d %B, %Y", "%d %b %Y", "%d %B %Y", "%Y-%m-%d")
 _CANVAS = re.compile(r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<id>\d+)_(?P<number>\d+)_(?P<file>.+)", re.DOTALL)
 
@@ -253,8 +254,9 @@ class _Sorting:
     def brightspace(self, items: Sequence[Item], folders: Sequence[str]) -> None:
         """A folder, or a file, for each attempt; who has one name and two numbers is told so."""
         numbers: dict[str, set[str]] = {}
+        in_folders = frozenset(folders)
         for name in [*folders, *(item.name for item in items if len(item.parts) == 1)]:
-            if found := _BRIGHTSPACE.fullmatch(name):
+            if found := (_BRIGHTSPACE_FOLDER if name in in_folders else _BRIGHTSPACE).fullmatch(name):
                 numbers.setdefault(found["name"], set()).add(found["user"])
 
         def of(found: re.Match[str]) -> StudentFiles:
@@ -268,18 +270,19 @@ class _Sorting:
             return handed
 
         for item in items:
-            found = _BRIGHTSPACE.fullmatch(item.parts[0])
-            if found is None or not (found["file"] or len(item.parts) > 1):
+            is_alone = len(item.parts) == 1
+            found = (_BRIGHTSPACE if is_alone else _BRIGHTSPACE_FOLDER).fullmatch(item.parts[0])
+            if found is None or (is_alone and not found["file"]):
                 self.plain(item)
                 continue
-            parts = (found["file"],) if len(item.parts) == 1 else item.parts[1:]
+            parts = (found["file"],) if is_alone else item.parts[1:]
             when, handed = _brightspace_time(found["time"]), of(found)
             said = f"{NOT_UNDERSTOOD} ({shown(found['time'])!r}), and so is taken for nothing"
             if when is None and said not in handed.notes:
                 handed.notes.append(said)
             handed.items.append(replace(item, parts=parts, time=when, attempt=found["time"]))
         for folder in folders:
-            found = _BRIGHTSPACE.fullmatch(folder)
+            found = _BRIGHTSPACE_FOLDER.fullmatch(folder)
             if found:
                 of(found)
             else:
@@ -289,7 +292,10 @@ class _Sorting:
         who = submitters.get(folder)
         if who is None:
             return self.files_of(folder)
-        return self.files_of(who.student, platform="gradescope", **who.source)
+        handed = self.files_of(who.student, platform="gradescope", **who.source)
+        if who.note and who.note not in handed.notes:
+            handed.notes.append(who.note)
+        return handed
 
     def gradescope(self, item: Item, submitters: dict[str, Submitter]) -> None:
         if len(item.parts) == 1:

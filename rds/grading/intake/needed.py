@@ -108,8 +108,8 @@ def _follow(
     """Keep also what may change the data in ways that its text does not name. NotFollowed where that cannot be run."""
     modules = dict(chain.from_iterable(map(imported, body)))
     functions = {each.name: each for each in body if isinstance(each, followed.FUNCTIONS)}
-    for statement in body:
-        if said := followed.namespaces_in(statement):
+    for number, statement in enumerate(body):
+        if said := followed.namespaces_in(statement, absent[number]):
             raise NotFollowed(statement.lineno, f"{said} reaches names that nobody can see there")
     blocked: set[int] = set()
     before = -1

@@ -43,7 +43,8 @@ def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
             raise InputError(f"student {student!r} has a line above already; keep one of them", place)
         try:
             when = datetime.fromisoformat((row["timestamp"] or "").strip())
-        except ValueError:
+            when.astimezone(UTC)
+        except (ValueError, OverflowError):
             said = row["timestamp"]
             raise InputError(f"timestamp = {said!r} is no time; as in 2026-11-30T23:59:00+01:00", place) from None
         found[student] = when if when.tzinfo else when.replace(tzinfo=zone or UTC)
@@ -58,8 +59,10 @@ def stamped_time(handed: StudentFiles) -> datetime | None:
     try:
         text = handed.stamp.read(_LARGEST).decode().strip()
         when = _nbgrader_time(text)
-        return when if when.tzinfo else when.replace(tzinfo=UTC)
-    except (Refusal, UnicodeDecodeError, ValueError, KeyError, OSError):
+        when = when if when.tzinfo else when.replace(tzinfo=UTC)
+        when.astimezone(UTC)  # a gradebook has it so; OverflowError at the ends of the calendar
+        return when
+    except (Refusal, UnicodeDecodeError, ValueError, KeyError, OSError, OverflowError):
         handed.notes.append(f"{NOT_UNDERSTOOD} ({text[:60]!r} in its {STAMP}), and so is taken for nothing")
         return None
 

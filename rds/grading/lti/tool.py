@@ -6,9 +6,12 @@ It listens on this computer alone; the way in from outside is the web server tha
 from __future__ import annotations
 
 import json
+import re
 import secrets
 import time
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
 from email.message import Message
 from html import escape
 from http.cookies import CookieError, SimpleCookie
@@ -16,12 +19,12 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Lock
 from typing import Any
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.grading.intake.notebooks import LARGEST
-from rds.grading.lti.launches import Launched, keep_launch, keep_submission, student_of
+from rds.grading.lti.launches import Launched, keep_launch, keep_submission, read_launches, student_of
 from rds.grading.lti.registration import check_address, read_registration, tool_config, tool_key
 from rds.results.report import page
 
@@ -31,6 +34,10 @@ _PASS_LIFE = 3600.0  # s in which a student may hand in after a launch
 _MOST_PASSES = 10_000
 _MOST_FORM = 1 << 20  # bytes of a launch
 _PATIENCE = 30.0  # s for a slow sender
+_FORM = re.compile(r'multipart/form-data *; *boundary="?([^\s";]{1,70})"?', re.IGNORECASE)
+_SAYS = re.compile(rb'; *(name|filename)="([^"\r\n]*)"', re.IGNORECASE)  # of a part of a form, in its head
+_MOST_PARTS, _MOST_HEAD = 10, 4096  # bytes
+_MOST_DIGITS = 12  # of a length
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; form-action 'self'"
 
 
@@ -95,6 +102,9 @@ class Tool:
             except Exception as error:  # as above; whatever it cannot read of a message is no launch
                 raise Refused(f"the launch is not valid: {error}") from error
             found = _launched(data)
+            known = read_launches(self._folder).get(found.student)
+            if known is not None and known.user != found.user:  # whose file this one's would take the place of
+                found = replace(found, student=student_of(found.user, ""))
             keep_launch(self._folder, found)
             word = secrets.token_urlsafe(32)
             while len(self._passes) >= _MOST_PASSES:
@@ -143,19 +153,24 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = _PATIENCE
     server_version, sys_version = "rds", ""
 
+    def handle(self) -> None:
+        """One request; who goes away before the answer is no fault of the tool's."""
+        with suppress(ConnectionError):
+            super().handle()
+
     def do_GET(self) -> None:
         """Keys; some platforms begin a login by GET."""
-        parts = urlsplit(self.path)
-        if parts.path == "/jwks":
+        path, _, query = self.path.partition("?")
+        if path == "/jwks":
             self._answer(200, json.dumps(self.own.keys()).encode(), "application/json")
-        elif parts.path == "/login":
-            self._guarded(lambda: self._login(dict(parse_qsl(parts.query))))
+        elif path == "/login":
+            self._guarded(lambda: self._login(dict(parse_qsl(query))))
         else:
             self._page(404, "There is nothing here", "Open the assignment in your course.")
 
     def do_POST(self) -> None:
         """Login, launch, hand in."""
-        path = urlsplit(self.path).path
+        path = self.path.partition("?")[0]
         steps = {"/login": self._post_login, "/launch": self._launch, "/hand-in": self._hand_in}
         if path in steps:
             self._guarded(steps[path])
@@ -211,7 +226,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _body(self, most: int) -> bytes:
         length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > most:
+        if not length.isdecimal() or len(length) > _MOST_DIGITS or int(length) > most:
             self.close_connection = True
             raise Refused(f"the file is larger than {most} bytes, or its size is not said")
         return self.rfile.read(int(length))
@@ -232,20 +247,23 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _multipart(headers: Message, body: bytes) -> tuple[dict[str, str], str, bytes]:
-    """Fields, and the name and bytes of the one file."""
-    from email.parser import BytesParser
-    from email.policy import HTTP
+    """Fields, and the name and bytes of the one file, of a form as browsers send it.
 
-    head = f"Content-Type: {headers.get('Content-Type', '')}\r\n\r\n".encode()
-    whole = BytesParser(policy=HTTP).parsebytes(head + body)
+    Anybody can send one, so it is cut here: a reader of e-mail takes minutes and gigabytes for one that is made for it.
+    """
+    kind = _FORM.fullmatch(headers.get("Content-Type", ""))
     fields: dict[str, str] = {}
     found: tuple[str, bytes] | None = None
-    for part in whole.iter_parts() if whole.is_multipart() else ():
-        data = part.get_payload(decode=True) or b""
-        if part.get_filename() is not None:
-            found = str(part.get_filename()), bytes(data)
-        else:
-            fields[str(part.get_param("name", header="content-disposition"))] = bytes(data).decode("utf-8", "replace")
+    parts = (b"\r\n" + body).split(b"\r\n--" + kind[1].encode(), _MOST_PARTS) if kind else []
+    for part in parts[1:]:
+        if part.startswith(b"--"):
+            break
+        head, _, data = part.partition(b"\r\n\r\n")
+        said = {name.lower(): text.decode("utf-8", "replace") for name, text in _SAYS.findall(head[:_MOST_HEAD])}
+        if b"filename" in said:
+            found = said[b"filename"], data
+        elif b"name" in said:
+            fields[said[b"name"]] = data.decode("utf-8", "replace")
     if found is None:
         raise InputError("no file came with it; choose one")
     return fields, *found

@@ -14,18 +14,22 @@ PREFIX = "/opt/python"
 """Where an interpreter is that is not the system's: its own place can be one that the sandbox uses itself, as /tmp."""
 
 ROOMS = (
-    *("__init__.py", "core", "checks", "models", "modes", "machines"),
+    *("__init__.py", "core", "checks", "modes", "machines"),
+    *(f"models/{name}.py" for name in ("__init__", "ode", "student")),  # that run a model, and are none
     *(f"network/{name}.py" for name in ("__init__", "delays", "distributions", "links")),  # which a plan may have
     *("grading/__init__.py", "grading/grade.py", "grading/sandbox"),
 )
 """What of this package is visible inside: the fixed interfaces. The laws and methods of the library are not: to write
 such a thing is what an assignment asks for."""
 
+_METHODS = ("machines/kinematics", "machines/forces")
+"""What holds methods in one of these rooms: it is not visible."""
+
 _DEVICES = ("/dev/null", "/dev/random", "/dev/urandom")  # not zero: mapped, it is memory that nobody counts
 _LIBRARIES = ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/etc/ld.so.cache")
 _ENVIRONMENT = {
     "HOME": "/tmp",
-    "LANG": "C.UTF-8",
+    "LANG": "C",  # whose data are in no file, so that setlocale(LC_ALL, "") finds it; texts are UTF-8 by -X utf8
     "LD_LIBRARY_PATH": f"{PREFIX}/lib",  # of a prefix of its own: its libraries lie elsewhere than they were built for
     "MPLBACKEND": "Agg",
     "MPLCONFIGDIR": "/tmp",
@@ -169,4 +173,11 @@ def _links() -> list[str]:
 
 def _sources() -> list[Bind]:
     package = Path(__file__).resolve().parents[2]
-    return [Bind(package / name, f"{SOURCES}/rds/{name}") for name in ROOMS]
+    names: list[str] = []
+    for room in ROOMS:
+        if any(name.startswith(f"{room}/") for name in _METHODS):  # an empty folder could be imported
+            inside = {f"{room}/{each.name}" for each in (package / room).iterdir() if each.name != "__pycache__"}
+            names += sorted(inside - set(_METHODS))
+        else:
+            names.append(room)
+    return [Bind(package / name, f"{SOURCES}/rds/{name}") for name in names]

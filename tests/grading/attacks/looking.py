@@ -58,7 +58,8 @@ assert not [each for each in raw if b"ATTACK-CANARY" in each], raw
 """
 _LIBRARY = """
 for name in ("rds.controllers", "rds.interpolators", "rds.grading.assignment.assignment", "rds.grading.cases", "rds.grading.criteria",
-             "rds.modes.experiment", "rds.identification", "pytest", "rds.panels.session"):
+             "rds.modes.experiment", "rds.models.linear_axis", "rds.models.machine_motion", "rds.machines.kinematics.inverse",
+             "rds.machines.forces.milling", "rds.identification", "pytest", "rds.panels.session"):
     try:
         __import__(name)
     except ImportError:

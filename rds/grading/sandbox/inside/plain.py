@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,11 @@ def _plain(value: Any, depth: int, left: list[int]) -> Any:
         if not isfinite(value):
             raise NotPlain(f"it holds {value!r}")
         return value
+    if isinstance(value, Real):  # as a Fraction, or numpy's longdouble, which `tolist` leaves as it is
+        try:
+            return _plain(float(value), depth, left)
+        except OverflowError:
+            raise NotPlain(f"it holds a {type(value).__name__} beyond what a float can be") from None
     if isinstance(value, list | tuple):
         return [_plain(part, depth + 1, left) for part in value]
     if isinstance(value, dict):

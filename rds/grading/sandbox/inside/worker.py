@@ -154,6 +154,7 @@ def _functions(file: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location("submission", file)
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses and pickle look it up there
     spec.loader.exec_module(module)
     return module
 
