@@ -47,6 +47,11 @@ ASKEW = """<robot name="r"><link name="base"/><link name="a"/>
 <joint name="q" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 1"/></joint></robot>"""
 
 
+LIMIT = '<limit lower="%s" upper="0"/><axis'
+SECOND = """<link name="b"/>
+<joint name="q2" type="fixed"><parent link="a"/><child link="b"/></joint></robot>"""
+
+
 def test_an_axis_that_is_askew(tmp_path: Path) -> None:
     """By Rodrigues' formula: half a turn about (0, 1, 1) exchanges y and z, and turns x round."""
     path = tmp_path / "own.toml"
@@ -66,6 +71,17 @@ def test_an_axis_that_is_askew(tmp_path: Path) -> None:
         (ASKEW.replace("continuous", "fixed"), "no joint moves"),
         (ASKEW.replace("0 1 1", "0 1"), "must be three numbers"),
         (ASKEW.replace('<child link="a"/>', ""), "has no <child link=>"),
+        (
+            ASKEW.replace("continuous", "prismatic").replace("<axis", LIMIT % "-0,1"),
+            "'q' has <limit lower='-0,1' upper='0'>",
+        ),
+        (ASKEW.replace("continuous", "revolute").replace("<axis", LIMIT % "0"), "two numbers, the lower one first"),
+        (ASKEW.replace("continuous", "revolute").replace("<axis", LIMIT % "-inf"), "two numbers, the lower one first"),
+        (ASKEW.replace("<axis", '<mimic joint="p"/><axis'), "'q' follows another"),
+        (ASKEW.replace("0 1 1", "0 0 0"), "'q' has an <axis> without a direction"),
+        (ASKEW.replace("</robot>", SECOND.replace("q2", "q")), "two joints are called 'q'"),
+        (ASKEW.replace("</robot>", SECOND.replace('child link="b"', 'child link="a"')), "two joints move 'a'"),
+        ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arm/></robot>', "is a xacro"),
         (ASKEW.replace("</robot>", '<link name="c"/></robot>'), "must hang on one root; roots are base, c"),
     ],
 )
