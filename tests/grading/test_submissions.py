@@ -294,6 +294,15 @@ def test_gradescope_s_zip_takes_the_newest(tmp_path: Path) -> None:
     assert [each["name"] for each in found["ben@example.edu"].source["members"]] == ["Ben\\nOdd", "Cy"]
 
 
+def test_gradescope_s_results_of_another_grader_are_of_any_type(tmp_path: Path) -> None:
+    """They may hold Ruby's own types, and texts that are special in YAML; a number of a student keeps its zeros."""
+    results = "  :results: !ruby/hash:ActiveSupport::HashWithIndifferentAccess\n    output: =\n    log: !binary 4pyT\n"
+    text = GRADESCOPE.replace("submission_2:", f"{results}submission_2:").replace("'0042'", "0042")
+    files: dict[str, str | bytes] = {"submission_metadata.yml": text, "submission_2/controller.py": ""}
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert found["0042"].time == datetime(2026, 1, 8, 10, tzinfo=UTC)
+
+
 @pytest.mark.parametrize("text", ["[", "- 1", "a: 1", "!!python/object/apply:os.system [id]", "x: &a [*a]"])
 def test_gradescope_metadata_that_is_none(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError, match=r"submission_metadata\.yml"):
