@@ -244,6 +244,16 @@ def test_the_last_version_of_teams_counts(around: str, others: dict[str, str], t
         assert found["Ada"].read() == b"tenth" and any("and not Version 2" in note for note in found["Ada"].notes)
 
 
+@pytest.mark.parametrize("around", ["", "Student Work/"])
+def test_drafts_in_teams_are_nobody_s(around: str, tmp_path: Path) -> None:
+    files = {f"Submitted files/{who}/Task/Version 1/controller.py": who for who in ("Ada", "Ben")}
+    files |= {f"Working files/{who}/Task/controller.py": "draft" for who in ("Ada", "Cy")}
+    packed = zipped(tmp_path / "all.zip", {around + name: text.encode() for name, text in files.items()})
+    found = collect(packed, ACCEPTED)
+    assert {row.student: row.read().decode() for row in found.rows} == {"Ada": "Ada", "Ben": "Ben"}
+    assert found.ignored == ("Working files",)
+
+
 def test_blackboard_s_users_with_one_ending_are_kept_apart(tmp_path: Path) -> None:
     files = {f"Task_{user}_attempt_2026-01-09-10-00-00_controller.py": user for user in ("a_l", "b_l", "cy")}
     found = of(put(tmp_path, files))
