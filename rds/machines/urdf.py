@@ -61,6 +61,12 @@ def urdf_text(machine: Machine) -> str:
         if not whole:
             _joint(robot, f"{link.name}_fixed", "fixed", moved, link.name, _matrix(after))
     for name, end in ((TIP, machine.tool or ChainEnd(machine.links[-1].name)), (ZERO, machine.work or ChainEnd())):
+        if any(link.name == name for link in machine.links):
+            if end.link != name or any([*end.angles, *end.offset]):
+                raise InputError(
+                    f"in a URDF {name!r} is the end of the chain; give this link of the machine another name"
+                )
+            continue
         _joint(robot, f"{name}_fixed", "fixed", end.link, name, transformation([*end.angles, *end.offset]))
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"

@@ -41,6 +41,9 @@ def test_a_machine_is_read_back(name: str, tmp_path: Path) -> None:
     order = [own.joints.index(joint) for joint in again.joints]
     np.testing.assert_allclose(again.forward(q[:, order]), own.forward(q), atol=1e-9)
     np.testing.assert_allclose(again.limits, own.limits[order], atol=1e-9)
+    twice = machine_text_of_urdf(urdf_text(load_machine(str(path))), "again")  # whose links are called as the ends are
+    path.write_text(twice, encoding="utf-8")
+    np.testing.assert_allclose(load_machine(str(path)).kinematics.forward(q[:, order]), own.forward(q), atol=1e-9)
 
 
 ASKEW = """<robot name="r"><link name="base"/><link name="a"/>
@@ -88,6 +91,14 @@ def test_an_axis_that_is_askew(tmp_path: Path) -> None:
 def test_what_is_no_chain(text: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         machine_text_of_urdf(text, "own", "own.urdf")
+
+
+def test_a_link_that_is_called_as_another_end_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    text = machine_text_of_urdf(urdf_text(load_machine("xyzac")), "own")
+    path.write_text(text.replace('[tool]\nlink = "tool_tip"', '[tool]\nlink = "tool_tip"\noffset = [0.0, 0.0, 5.0]'))
+    with pytest.raises(InputError, match="'tool_tip' is the end of the chain"):
+        urdf_text(load_machine(str(path)))
 
 
 def test_a_machine_without_links_has_no_urdf() -> None:
