@@ -174,6 +174,7 @@ def test_what_is_not_what_it_should_be_is_named(fitted: tuple[rds.Log, Any]) -> 
     for said, do in {
         "'run' is no log; rds.read_log": lambda: rds.validate(estimate, "run"),
         "'run.csv' is no log": lambda: rds.fit("run.csv", "axis"),
+        r"a list is no file; save it, .*to_parquet\('log.parquet'\)": lambda: rds.read_log([[0.0, 1.0]]),
         "3 is no log": lambda: rds.frequency_response(3),
         "2 logs are given, and one is wanted": lambda: rds.compare_models([estimate, estimate], [log, log]),
         "<Log run: .* is no result; rds.open_result": lambda: rds.compare(log, log),
