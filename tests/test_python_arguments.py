@@ -193,6 +193,7 @@ def test_what_is_not_what_it_should_be_is_named(fitted: tuple[rds.Log, Any]) -> 
         "2 logs are given, and one is wanted": lambda: rds.compare_models([estimate, estimate], [log, log]),
         "Framed'> is no result; rds.open_result": lambda: rds.compare(Framed, Framed),
         "<Log run: .* is no result; rds.open_result": lambda: rds.compare(log, log),
+        "poles = -30 must be a list": lambda: rds.design(estimate, poles=-30),
         "is no structure; give its name": lambda: rds.fit(log, 3),
         "structure axis has no option 'viscus'": lambda: rds.structure("axis", "viscus"),
         "'part.ngc' is no LineSegment": lambda: rds.interpolate("part.ngc", 1e-3),
