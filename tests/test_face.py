@@ -117,7 +117,9 @@ class TestAModelAlone:
             ({"U": 1.0, "T": times, "X0": [np.nan, 0.0]}, r"X0 = \[nan, 0.0\] does not fit; give 2 finite numbers"),
             ({"U": 1.0, "T": times, "X0": ["here", 0.0]}, "X0 = .* is not made of real numbers"),
             ({"U": 1.0 + 1.0j, "T": times}, "U = .* is not made of real numbers"),
+            ({"U": np.full(len(times), 1.0 + 1.0j), "T": times}, "real numbers: it has the type complex128"),
             ({"U": 1.0, "T": ["now", "then"]}, "T = .* is not made of real numbers"),
+            ({"U": 1.0, "T": np.arange(3).astype("datetime64[ms]")}, r"it has the type datetime64\[ms\]"),
             ({"U": 1.0, "T": times, "params": {"mass": 1.0}}, "no parameter 'mass'; it has"),
         ],
     )

@@ -169,17 +169,38 @@ def test_a_law_is_designed_for_what_a_fit_found(fitted: tuple[rds.Log, Any], tmp
     assert rds.design(estimate).params == rds.design(tmp_path / "fitted.toml").params
 
 
+class Framed:
+    """As a table of pandas, which has axes, too."""
+
+    axes = ()
+
+
+def test_points_of_arrays_and_lists_are_points() -> None:
+    there, back = np.array([0.0, 0.0]), np.array([3.0, 4.0])
+    path = rds.interpolate([rds.LineSegment(there, back, 5.0), rds.LineSegment(back, [0.0, 0.0], 5.0)], 1e-3)
+    assert np.abs(path.position).max(axis=0) == pytest.approx([3.0, 4.0], abs=0.01)
+    circle = rds.interpolate(rds.ArcSegment([1.0, 0.0], np.array([1.0, 0.0]), (0.0, 0.0), 5.0), 1e-3)
+    assert len(circle.position) == pytest.approx(2.0 * np.pi / 5.0 * 1000, abs=3)
+
+
 def test_what_is_not_what_it_should_be_is_named(fitted: tuple[rds.Log, Any]) -> None:
     log, estimate = fitted
     for said, do in {
         "'run' is no log; rds.read_log": lambda: rds.validate(estimate, "run"),
         "'run.csv' is no log": lambda: rds.fit("run.csv", "axis"),
+        r"a list is no file; save it, .*to_parquet\('log.parquet'\)": lambda: rds.read_log([[0.0, 1.0]]),
         "3 is no log": lambda: rds.frequency_response(3),
         "2 logs are given, and one is wanted": lambda: rds.compare_models([estimate, estimate], [log, log]),
+        "Framed'> is no result; rds.open_result": lambda: rds.compare(Framed, Framed),
         "<Log run: .* is no result; rds.open_result": lambda: rds.compare(log, log),
+        "poles = -30 must be a list": lambda: rds.design(estimate, poles=-30),
         "is no structure; give its name": lambda: rds.fit(log, 3),
         "structure axis has no option 'viscus'": lambda: rds.structure("axis", "viscus"),
         "'part.ngc' is no LineSegment": lambda: rds.interpolate("part.ngc", 1e-3),
+        "must be numbers: 'int' object is not iterable": lambda: rds.interpolate(rds.LineSegment(0, 1, 5.0), 1e-3),
+        "must be numbers: must be real number, not str": lambda: rds.interpolate(
+            rds.LineSegment((0,), (1,), "5"), 1e-3
+        ),
         "period = nan s": lambda: rds.frequency_response(log, period=float("nan")),
         "is what a fit found, and a run wants a file; rds.write_model": lambda: rds.Experiment(model=estimate),
         "there is no machine 'xxx": lambda: rds.verdict("x" * 5000),

@@ -86,9 +86,26 @@ def new(
             text = _scanned(out.stem, order, before, chosen_bus(interface, channel, experiment, bitrate))
         else:
             text = _from_file(script, out.stem, before)
+        judged = verdict(_readable(text, out.name))
         write_made(out, text)
-        judged = verdict(load_machine(str(out)))
     _show_verdict(judged, json, f"wrote {out}")
+
+
+def _readable(text: str, name: str) -> Machine:
+    """The machine of a file that is not written yet: one that is refused must not take the place of a good one."""
+    from tempfile import TemporaryDirectory
+
+    from rds.core.errors import InputError
+    from rds.machines import load_machine
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder, name)
+        write_made(path, text)
+        try:
+            return load_machine(str(path))
+        except InputError as error:
+            said = str(error).removeprefix(f"{error.where}: ")
+            raise InputError(f"{name} is not written, as no machine comes of it: {said}") from None
 
 
 def _from_file(path: Path | None, name: str, before: Machine | None) -> str:
@@ -103,7 +120,7 @@ def _from_file(path: Path | None, name: str, before: Machine | None) -> str:
         raise InputError("is no text; name a configuration script or a .urdf file", str(path)) from None
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror}); check the path", str(path)) from error
-    if path.suffix.lower() == ".urdf":
+    if path.suffix.lower() == ".urdf" or text.lstrip("\ufeff \t\r\n").startswith("<"):
         if before is not None:
             raise InputError("--like belongs to a script or --scan; a .urdf file says all of its joints", str(path))
         return machine_text_of_urdf(text, name, str(path))

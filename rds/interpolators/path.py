@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -47,8 +48,12 @@ def interpolate(
     segments = list(segments) if isinstance(segments, Iterable) and not isinstance(segments, str) else [segments]
     base = as_interpolator(DEFAULT if method is None else method)
     pair = (base if lines is None else as_interpolator(lines), base if arcs is None else as_interpolator(arcs))
-    names = _names(axes, segments)
-    check_chain(segments, T)
+    try:
+        segments = [_of_tuples(segment) for segment in segments]
+        names = _names(axes, segments)
+        check_chain(segments, T)
+    except TypeError as error:
+        raise InputError(f"positions (mm), one for each axis, feed rates and T must be numbers: {error}") from None
     chosen = [pair[isinstance(segment, ArcSegment)] for segment in segments]
     parts = [each.rows(segment, T) for each, segment in zip(chosen, segments, strict=True)]
     weights = acceleration.weights(T) if acceleration else np.ones(1)
@@ -117,6 +122,16 @@ def _streams(
         stay(ceil(rests.get(end, 0.0) / T - 1e-9), end)
         begin = end + 1
     return np.concatenate(rows), np.concatenate(first), np.concatenate(last)
+
+
+def _of_tuples(segment: Segment) -> Segment:
+    """With points as the methods compare them: of an array, a list and a tuple no two are equal."""
+    points = [name for name in ("start", "end", "centre") if not isinstance(getattr(segment, name, ()), tuple)]
+    given = {name: getattr(segment, name) for name in points}
+    made: dict[str, Any] = {
+        name: tuple(point.tolist() if hasattr(point, "tolist") else point) for name, point in given.items()
+    }
+    return replace(segment, **made) if made else segment
 
 
 def _names(axes: Sequence[str] | None, segments: Sequence[Segment]) -> tuple[str, ...]:

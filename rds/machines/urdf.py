@@ -8,7 +8,7 @@ own XML reader gives.
 
 from __future__ import annotations
 
-from math import degrees, radians
+from math import degrees, inf, radians
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
@@ -61,6 +61,12 @@ def urdf_text(machine: Machine) -> str:
         if not whole:
             _joint(robot, f"{link.name}_fixed", "fixed", moved, link.name, _matrix(after))
     for name, end in ((TIP, machine.tool or ChainEnd(machine.links[-1].name)), (ZERO, machine.work or ChainEnd())):
+        if any(link.name == name for link in machine.links):
+            if end.link != name or any([*end.angles, *end.offset]):
+                raise InputError(
+                    f"in a URDF {name!r} is the end of the chain; give this link of the machine another name"
+                )
+            continue
         _joint(robot, f"{name}_fixed", "fixed", end.link, name, transformation([*end.angles, *end.offset]))
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
@@ -75,10 +81,16 @@ def machine_text_of_urdf(text: str, name: str, path: str = "") -> str:
         robot = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise InputError(f"is no XML: {error}", path) from None
+    if any("xacro" in str(element.tag) for element in robot.iter()):
+        raise InputError("is a xacro, from which a URDF is made: `xacro FILE.xacro > FILE.urdf`; name that", path)
     joints = robot.findall("joint")
     if robot.tag != "robot" or not joints:
         raise InputError("is no URDF with joints: <robot> with <link> and <joint> is needed", path)
-    children = {_named(joint, "child", path) for joint in joints}
+    children = [_named(joint, "child", path) for joint in joints]
+    for what, names in (("joints are called", [joint.get("name", "") for joint in joints]), ("joints move", children)):
+        for each in names:
+            if names.count(each) > 1:
+                raise InputError(f"two {what} {each!r}; give each its own", path)
     roots = [link.get("name", "") for link in robot.findall("link") if link.get("name") not in children]
     if len(roots) != 1:
         raise InputError(f"its links must hang on one root; roots are {', '.join(roots) or 'none'}", path)
@@ -116,16 +128,13 @@ def _read_joint(
         return
     if kind not in ("prismatic", "revolute", "continuous"):
         raise InputError(f"joint {name!r} is {kind!r}; joints are fixed, prismatic, revolute or continuous", path)
+    if joint.find("mimic") is not None:  # taken for an axis of its own, it would stand still where it should follow
+        raise InputError(f"joint {name!r} follows another (<mimic>), which no axis here does; make it fixed", path)
     turns = kind != "prismatic"
-    limit = joint.find("limit")
-    if kind == "continuous":
-        low, high = -_TURN, _TURN
-    else:
-        given = [None if limit is None else limit.get(key) for key in ("lower", "upper")]
-        if None in given:
-            raise InputError(f"joint {name!r} has no <limit lower= upper=>; add its travel", path)
-        low, high = ((degrees(float(v or 0)) if turns else float(v or 0) * _MM) for v in given)
+    low, high = (-_TURN, _TURN) if kind == "continuous" else _travel(joint, turns, path)
     along = _three(joint.find("axis"), "xyz", path) if joint.find("axis") is not None else [1.0, 0.0, 0.0]
+    if not any(along):
+        raise InputError(f"joint {name!r} has an <axis> without a direction; give it xyz", path)
     askew = np.eye(4)
     number, sign = int(np.argmax(np.abs(along))), 1 if max(along, key=abs) > 0 else -1
     if sum(abs(value) > _SAME for value in along) != 1:
@@ -143,6 +152,24 @@ def _read_joint(
     axes[name] = {"node": len(axes) + 2, "unit": "deg" if turns else "mm", "travel": [low, high], "resolution": 0.001}
     if not straight:
         links.append(_link(frames[child], f"{name}_moved", np.linalg.inv(askew)))
+
+
+def _travel(joint: ElementTree.Element, turns: bool, path: str) -> list[float]:
+    """The lowest and the highest value of a joint, in mm or degrees."""
+    name, limit = joint.get("name", ""), joint.find("limit")
+    given = [None if limit is None else limit.get(key) for key in ("lower", "upper")]
+    if None in given:
+        raise InputError(f"joint {name!r} has no <limit lower= upper=>; add its travel", path)
+    try:
+        low, high = (float(value or 0) for value in given)
+    except ValueError:
+        low = high = 0.0
+    if not -inf < low < high < inf:
+        said = f"lower={given[0]!r} upper={given[1]!r}"
+        raise InputError(
+            f"joint {name!r} has <limit {said}>: its travel must be two numbers, the lower one first", path
+        )
+    return [degrees(value) if turns else value * _MM for value in (low, high)]
 
 
 def _link(name: str, parent: str, matrix: np.ndarray) -> dict[str, Any]:

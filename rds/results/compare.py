@@ -145,7 +145,7 @@ def compare(a: Result, b: Result) -> Comparison:
     Nothing is interpolated: results of different sample periods, or whose times are not multiples of it, have no
     common samples, and are refused. Raises InputError for these, and for results without a common axis or sample.
     """
-    if (other := next((each for each in (a, b) if not hasattr(each, "axes")), None)) is not None:
+    if (other := next((each for each in (a, b) if not hasattr(each, "metrics")), None)) is not None:
         said = f"{other}" if isinstance(other, str | Path) else f"{other!r:.60}"
         raise InputError(f"{said} is no result; rds.open_result opens the one that is there")
     T = a.sample_period

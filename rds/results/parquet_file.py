@@ -81,19 +81,27 @@ def read_here(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any] | None]
     with open(path, "rb") as stream:
         try:
             # none of Arrow's threads: one that lets go of the stream's buffers while Python ends aborts the process
-            file = parquet.ParquetFile(stream, pre_buffer=False)
+            file = parquet.ParquetFile(stream, pre_buffer=False, page_checksum_verification=True)
             text = (file.metadata.metadata or {}).get(_DESCRIPTION)
             schema = file.schema_arrow
             numbers = [field.name for field in schema if _is_number(field.type)]
             if len(set(schema.names)) != len(schema.names):
                 raise InputError("two columns have the same name; rename one")
             table = file.read(columns=numbers, use_threads=False)
+            columns = {name: _of_floats(table.column(name)) for name in numbers}
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(f"it is not a Parquet file, or is truncated ({error}); take another copy") from error
-    return {name: to_numpy(table.column(name)) for name in numbers}, None if text is None else parse(text)
+    return {name: to_numpy(column) for name, column in columns.items()}, None if text is None else parse(text)
 
 
 def _is_number(kind: Any) -> bool:
     import pyarrow as pa
 
-    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind))
+    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind))
+
+
+def _of_floats(column: Any) -> Any:
+    """Decimal numbers, as databases write them, as floats; all others as they are."""
+    import pyarrow as pa
+
+    return column.cast(pa.float64()) if pa.types.is_decimal(column.type) else column

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from math import inf
+from typing import Any
 
 import pytest
 
@@ -30,6 +31,16 @@ def test_the_mini_cnc_at_1_mbit() -> None:
     assert analysis.row("answer Z").sender == "Z"
     with pytest.raises(InputError, match="no message 'answer W'"):
         analysis.row("answer W")
+
+
+def test_a_bit_rate_may_be_written_as_a_float_and_is_whole() -> None:
+    table = [Message("a", identifier=1, extended=False, size=8, period=0.01)]
+    rate: Any = 500e3
+    assert analyse_messages(table, rate) == analyse_messages(table, 500_000)
+    wrong: list[Any] = [1000.5, inf, "500000", None]
+    for rate in wrong:
+        with pytest.raises(InputError, match="whole number of bit/s"):
+            analyse_messages(table, rate)
 
 
 @pytest.mark.parametrize(("bitrate", "period"), [(125_000, 1e-3), (250_000, 1e-3), (500_000, 1e-3), (1_000_000, 5e-4)])

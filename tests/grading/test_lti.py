@@ -215,6 +215,12 @@ def test_a_message_that_is_not_for_this_tool_is_refused(course: Course, changes:
     assert code == 403 and not (course.folder / "lti-launches.jsonl").exists()
 
 
+def test_a_role_may_be_a_word(course: Course) -> None:
+    asked, cookie = course.login()
+    token = course.platform.token(asked["nonce"], **{f"{CLAIM}roles": ["Learner"]})
+    assert course.launch(token, asked["state"], cookie)[0] == 200
+
+
 def test_a_message_that_others_signed_is_refused(course: Course) -> None:
     asked, cookie = course.login()
     other = Platform({})

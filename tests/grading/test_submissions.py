@@ -252,6 +252,16 @@ def test_the_last_version_of_teams_counts(around: str, others: dict[str, str], t
         assert found["Ada"].read() == b"tenth" and any("and not Version 2" in note for note in found["Ada"].notes)
 
 
+@pytest.mark.parametrize("around", ["", "Student Work/"])
+def test_drafts_in_teams_are_nobody_s(around: str, tmp_path: Path) -> None:
+    files = {f"Submitted files/{who}/Task/Version 1/controller.py": who for who in ("Ada", "Ben")}
+    files |= {f"Working files/{who}/Task/controller.py": "draft" for who in ("Ada", "Cy")}
+    packed = zipped(tmp_path / "all.zip", {around + name: text.encode() for name, text in files.items()})
+    found = collect(packed, ACCEPTED)
+    assert {row.student: row.read().decode() for row in found.rows} == {"Ada": "Ada", "Ben": "Ben"}
+    assert found.ignored == ("Working files",)
+
+
 def test_blackboard_s_users_with_one_ending_are_kept_apart(tmp_path: Path) -> None:
     files = {f"Task_{user}_attempt_2026-01-09-10-00-00_controller.py": user for user in ("a_l", "b_l", "cy")}
     found = of(put(tmp_path, files))
@@ -314,6 +324,15 @@ def test_nobody_is_graded_in_another_s_place_by_a_student_id(tmp_path: Path) -> 
     assert list(found) == ["0042 (ada@example.edu)", "0042 (eve@example.edu)"]
     assert [each.read() for each in found.values()] == [b"ada", b"eve"]
     assert found["0042 (ada@example.edu)"].notes == ("somebody else has the same student ID (0042)",)
+
+
+def test_gradescope_s_results_of_another_grader_are_of_any_type(tmp_path: Path) -> None:
+    """They may hold Ruby's own types, and texts that are special in YAML; a number of a student keeps its zeros."""
+    results = "  :results: !ruby/hash:ActiveSupport::HashWithIndifferentAccess\n    output: =\n    log: !binary 4pyT\n"
+    text = GRADESCOPE.replace("submission_2:", f"{results}submission_2:").replace("'0042'", "0042")
+    files: dict[str, str | bytes] = {"submission_metadata.yml": text, "submission_2/controller.py": ""}
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert found["0042"].time == datetime(2026, 1, 8, 10, tzinfo=UTC)
 
 
 @pytest.mark.parametrize("text", ["[", "- 1", "a: 1", "!!python/object/apply:os.system [id]", "x: &a [*a]"])

@@ -136,6 +136,33 @@ def test_parquet_with_units_in_its_fields(tmp_path: Path) -> None:
     assert np.array_equal(log.position, made["position"])
 
 
+def test_parquet_of_a_database_has_decimals(tmp_path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    made = axis()
+    columns = {"time_s": pa.array(made["time"]).cast(pa.decimal128(18, 6)), "voltage_V": pa.array(made["voltage"])}
+    columns["position_mm"] = pa.array(np.round(made["position"], 3)).cast(pa.decimal128(12, 3))
+    parquet.write_table(pa.table(columns), tmp_path / "log.parquet")
+    (log,) = read_log(tmp_path / "log.parquet")
+    np.testing.assert_allclose(log.position, np.round(made["position"], 3), atol=1e-9)
+
+
+def test_a_parquet_page_that_does_not_match_its_checksum_is_refused(tmp_path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    path, made = tmp_path / "log.parquet", axis()
+    columns = {"time_s": made["time"], "voltage_V": made["voltage"], "position_mm": made["position"]}
+    parquet.write_table(pa.table(columns), path, compression="none", use_dictionary=False, write_page_checksum=True)
+    read_log(path)
+    data = bytearray(path.read_bytes())
+    data[data.index(made["position"][300:302].tobytes()) + 6] ^= 8
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="checksum"):
+        read_log(path)
+
+
 @pytest.mark.parametrize("ending", [".asc", ".blf", ".log", ".trc", ".log.gz", ".csv"])
 def test_bus_logs_with_a_dbc(tmp_path: Path, ending: str) -> None:
     made = axis(600)

@@ -130,6 +130,7 @@ def test_workspaces() -> None:
     thesis = workspace(load_machine("mrmt-oacs").kinematics, n=50_000)
     assert abs(thesis.points[:, :2]).max() == pytest.approx(83.5 + 150.0, rel=1e-2)
     assert thesis.high[2] - thesis.low[2] == pytest.approx(600.0)
+    assert workspace(load_machine("xyzac").kinematics).tilt == pytest.approx(110.0)  # as A is limited
 
 
 def test_virtual_limits_make_the_operational_workspace_smaller(tmp_path: Path) -> None:

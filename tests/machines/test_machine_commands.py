@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from machines.machine_text import link, text
 from machines.test_ncc import ERRORS, PAPER
+from machines.test_urdf import ASKEW
 from typer.testing import CliRunner, Result
 
 from rds.cli.main import app
@@ -51,6 +52,20 @@ def test_a_script_becomes_a_machine_and_a_machine_a_script() -> None:
     done = rds("machine", "new", "own.ncc", "-o", "other.toml")
     assert done.exit_code == 2 and "own.ncc, line 2: LN5 out of order" in done.stderr
     assert not Path("other.toml").exists()
+
+
+def test_a_urdf_that_is_refused_leaves_the_machine_that_was_there() -> None:
+    limit = '<axis xyz="1 0 0"/><limit lower="-1" upper="1"/>'
+    urdf = ASKEW.replace("continuous", "prismatic").replace('<axis xyz="0 1 1"/>', limit)
+    Path("own.xml").write_text(urdf)  # by whatever name
+    assert rds("machine", "new", "own.xml", "-o", "own.toml").exit_code == 0
+    before = Path("own.toml").read_text()
+    Path("own.urdf").write_text(urdf.replace('name="q"', 'name=""'))
+    done = rds("machine", "new", "own.urdf", "-o", "own.toml", "--force")
+    assert done.exit_code == 2 and "own.toml is not written" in done.stderr
+    assert Path("own.toml").read_text() == before
+    assert rds("machine", "new", "own.urdf", "-o", "new.toml").exit_code == 2
+    assert not Path("new.toml").exists()
 
 
 def test_what_is_no_machine_is_exit_code_1() -> None:

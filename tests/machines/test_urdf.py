@@ -41,10 +41,18 @@ def test_a_machine_is_read_back(name: str, tmp_path: Path) -> None:
     order = [own.joints.index(joint) for joint in again.joints]
     np.testing.assert_allclose(again.forward(q[:, order]), own.forward(q), atol=1e-9)
     np.testing.assert_allclose(again.limits, own.limits[order], atol=1e-9)
+    twice = machine_text_of_urdf(urdf_text(load_machine(str(path))), "again")  # whose links are called as the ends are
+    path.write_text(twice, encoding="utf-8")
+    np.testing.assert_allclose(load_machine(str(path)).kinematics.forward(q[:, order]), own.forward(q), atol=1e-9)
 
 
 ASKEW = """<robot name="r"><link name="base"/><link name="a"/>
 <joint name="q" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 1"/></joint></robot>"""
+
+
+LIMIT = '<limit lower="%s" upper="0"/><axis'
+SECOND = """<link name="b"/>
+<joint name="q2" type="fixed"><parent link="a"/><child link="b"/></joint></robot>"""
 
 
 def test_an_axis_that_is_askew(tmp_path: Path) -> None:
@@ -66,12 +74,31 @@ def test_an_axis_that_is_askew(tmp_path: Path) -> None:
         (ASKEW.replace("continuous", "fixed"), "no joint moves"),
         (ASKEW.replace("0 1 1", "0 1"), "must be three numbers"),
         (ASKEW.replace('<child link="a"/>', ""), "has no <child link=>"),
+        (
+            ASKEW.replace("continuous", "prismatic").replace("<axis", LIMIT % "-0,1"),
+            "'q' has <limit lower='-0,1' upper='0'>",
+        ),
+        (ASKEW.replace("continuous", "revolute").replace("<axis", LIMIT % "0"), "two numbers, the lower one first"),
+        (ASKEW.replace("continuous", "revolute").replace("<axis", LIMIT % "-inf"), "two numbers, the lower one first"),
+        (ASKEW.replace("<axis", '<mimic joint="p"/><axis'), "'q' follows another"),
+        (ASKEW.replace("0 1 1", "0 0 0"), "'q' has an <axis> without a direction"),
+        (ASKEW.replace("</robot>", SECOND.replace("q2", "q")), "two joints are called 'q'"),
+        (ASKEW.replace("</robot>", SECOND.replace('child link="b"', 'child link="a"')), "two joints move 'a'"),
+        ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arm/></robot>', "is a xacro"),
         (ASKEW.replace("</robot>", '<link name="c"/></robot>'), "must hang on one root; roots are base, c"),
     ],
 )
 def test_what_is_no_chain(text: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         machine_text_of_urdf(text, "own", "own.urdf")
+
+
+def test_a_link_that_is_called_as_another_end_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    text = machine_text_of_urdf(urdf_text(load_machine("xyzac")), "own")
+    path.write_text(text.replace('[tool]\nlink = "tool_tip"', '[tool]\nlink = "tool_tip"\noffset = [0.0, 0.0, 5.0]'))
+    with pytest.raises(InputError, match="'tool_tip' is the end of the chain"):
+        urdf_text(load_machine(str(path)))
 
 
 def test_a_machine_without_links_has_no_urdf() -> None:

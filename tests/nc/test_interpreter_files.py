@@ -26,6 +26,16 @@ def test_a_tool_table_is_read(tmp_path: Path) -> None:
     ]
 
 
+def test_the_line_of_no_tool_takes_a_slot_as_in_linuxcnc(tmp_path: Path) -> None:
+    path = tmp_path / "tool.tbl"
+    path.write_text("T0 P0 Z9 ; no tool loaded\nT1 P1 Z5\n")
+    calls = list(text(interpret("T1 M6 G43\nT0 M6\nG43\nM2\n", tools=read_tools(path))))
+    slots = [call for call in calls if "CHANGE_TOOL" in call]
+    lengths = [call.split()[4] for call in calls if "LENGTH_OFFSET" in call]
+    assert "CHANGE_TOOL(2)" in slots[0] and "CHANGE_TOOL(0)" in slots[1]
+    assert lengths == ["5.0000,", "0.0000,"]
+
+
 @pytest.mark.parametrize(
     ("table", "line", "column", "word", "message"),
     [
@@ -35,6 +45,7 @@ def test_a_tool_table_is_read(tmp_path: Path) -> None:
         ("T1 P1\nT1 P2\n", 2, 0, "T1", "comes twice"),
         ("T1.5 P1\n", 1, 1, "T1.5", "whole number"),
         ("T1 P1 D1e99\n", 1, 7, "D1e99", "too large"),
+        ("T-1 P1\n", 1, 0, "", "needs its number T"),
         ("T1 D6\n", 1, 0, "", "needs its number T (from 1) and its pocket P"),
         ("T1 P1 U2\n", 1, 0, "", "no such axes"),
     ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,6 +65,17 @@ def test_the_sun_symbol_is_cut_from_a_file_of_points(file: Path) -> None:
     program = part_program(path, "sun", safe_height=5)
     assert_cuts(program, path)
     agreed(program)
+
+
+def test_points_of_an_array_are_one_piece() -> None:
+    points = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]])
+    pieces_of_it = path_of_points([points], FEED)
+    assert path_of_points(points, FEED) == pieces_of_it == path_of_points(points.tolist(), FEED)
+    assert len(path_of_points([points, points[:2] + 9.0], FEED)[0]) == 3
+    wrong: list[Any] = ["x.csv", None, [1.0, 2.0], np.zeros((3, 4))]
+    for each in wrong:
+        with pytest.raises(InputError, match="points"):
+            path_of_points(each, FEED)
 
 
 def test_repeated_points_are_left_out_and_counted(file: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
+from numbers import Real
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from rds.bus.analysis.messages import Message, in_order, messages_of
@@ -174,7 +175,7 @@ def analyse_messages(
 
     `assumed` is said with the results: on what the times in the table rest.
     """
-    _check_rates(bitrate, data_bitrate)
+    bitrate, data_bitrate = _rates(bitrate, data_bitrate)
     table = in_order(messages)
     found = responses(table, bitrate, data_bitrate, errors)
     rows = tuple(_row(message, result, bitrate, data_bitrate) for message, result in zip(table, found, strict=True))
@@ -207,11 +208,16 @@ def _words(errors: Errors | None) -> str:
     return f"{errors.burst} error{'s come' if errors.burst > 1 else ' comes'} at once{more}"
 
 
-def _check_rates(bitrate: int, data_bitrate: int | None) -> None:
+def _rates(bitrate: int, data_bitrate: int | None) -> tuple[int, int | None]:
+    """Whole numbers of bit/s: 500e3 is one, too."""
+    for rate in (bitrate,) if data_bitrate is None else (bitrate, data_bitrate):
+        if not (isinstance(rate, Real) and rate % 1 == 0.0):
+            raise InputError(f"bit rate {rate!r} must be a whole number of bit/s, such as 500000")
     if not 1000 <= bitrate <= HIGHEST_BITRATE:
         raise InputError(f"bit rate {bitrate!r} bit/s must be from 1000 to {HIGHEST_BITRATE} (125000, 250000, 500000)")
     if data_bitrate is not None and not bitrate <= data_bitrate <= HIGHEST_DATA_BITRATE:
         raise InputError(f"data bit rate {data_bitrate!r} bit/s must be from {bitrate} to {HIGHEST_DATA_BITRATE}")
+    return int(bitrate), None if data_bitrate is None else int(data_bitrate)
 
 
 def _row(message: Message, result: Response, bitrate: int, data_bitrate: int | None) -> Row:

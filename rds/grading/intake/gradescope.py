@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -29,9 +30,10 @@ def read_metadata(data: bytes) -> dict[str, Submitter]:
     """Of each folder of an export its submitter. InputError if it is not what Gradescope writes."""
     with needed_for("reading it", where=METADATA):
         yaml = import_module("yaml")  # which has no types of its own
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    # texts, lists and mappings only: results of earlier graders hold whatever types Ruby has, and a number keeps its 0
+    loader = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
     try:
-        whole = yaml.load(data, Loader=loader)  # a safe loader: plain values only
+        whole = yaml.load(data, Loader=loader)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise InputError(f"is not YAML: {str(error).splitlines()[0]}; export it once more", METADATA) from error
     if not isinstance(whole, Mapping):
@@ -73,15 +75,13 @@ def _submitter(folder: str, about: Any) -> Submitter:
 
 
 def _text(value: Any) -> str:
-    return "" if value is None else shown(str(value))
+    return "" if value in (None, "~", "null") else shown(str(value))
 
 
 def _time(value: Any) -> datetime | None:
-    if isinstance(value, str):
-        try:
-            value = datetime.fromisoformat(value)
-        except ValueError:
-            return None
-    if not isinstance(value, datetime):
+    """As in 2026-01-05 10:12:34.567890000 Z."""
+    try:
+        time = datetime.fromisoformat(re.sub(r"\s+(?=Z|[+-])", "", str(value)))
+    except ValueError:
         return None
-    return value if value.tzinfo else value.replace(tzinfo=UTC)
+    return time if time.tzinfo else time.replace(tzinfo=UTC)

@@ -30,6 +30,7 @@ NOT_UNDERSTOOD = "the time at which it was handed in cannot be understood"  # be
 _PARTS = frozenset(
     {"code", "data", "doc", "docs", "lib", "notebooks", "old", "python", "source", "src", "test", "tests"}
 )
+_HANDED_IN, _DRAFTS = "Submitted files", "Working files"  # side by side in Teams
 _METADATA_LARGEST = 64 << 20  # bytes; Gradescope's holds all earlier results
 
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL)
@@ -84,11 +85,11 @@ def sorted_out(
     `zipped`: whether they are in an export, whose times are the learning platform's. `accepted`: the names that a
     submission should have. InputError if there are several assignments and none has such a name.
     """
-    outermost = list(folders)
+    outermost, count = list(folders), len(items)
     items, folders = _without_root(items, folders, zipped, accepted)
     times = next((item for item in items if item.parts == (TIMES,)), None)
+    sorting = _Sorting(zipped, ignored=[_DRAFTS] if len(items) < count else [])
     items = [item for item in items if item is not times]
-    sorting = _Sorting(zipped)
     metadata = next((item for item in items if item.parts == (METADATA,)), None)
     if metadata is not None:
         submitters = read_metadata(metadata.read(_METADATA_LARGEST))
@@ -134,10 +135,10 @@ def sorted_out(
 class _Sorting:
     """The files by student while they are being sorted."""
 
-    def __init__(self, zipped: bool):
+    def __init__(self, zipped: bool, ignored: list[str]):
         self._zipped = zipped
         self._by_student: dict[str, StudentFiles] = {}
-        self._ignored: list[str] = []
+        self._ignored = ignored
         self._files: dict[str, str] = {}  # by student the name of a file that is called like the student
         self._in_folders: set[str] = set()  # students with a folder that holds code
 
@@ -324,6 +325,8 @@ def _without_root(
     items: Sequence[Item], folders: Sequence[str], zipped: bool, accepted: Sequence[str]
 ) -> tuple[list[Item], list[str]]:
     """Without the one folder around everything that exports and courses have, or who packs a folder into a zip."""
+    if {*folders} == {_DRAFTS, _HANDED_IN}:
+        items, folders = [item for item in items if item.parts[0] != _DRAFTS], [_HANDED_IN]
     while len(folders) == 1 and all(len(item.parts) > 1 for item in items if item.is_handed_in):
         known = re.fullmatch(r"assignment_\d+_export|submitted|submissions|Student Work|Submitted files", folders[0])
         is_one_s = any(each.fullmatch(folders[0]) for each in (_MOODLE_FOLDER, _BRIGHTSPACE)) or any(
@@ -333,6 +336,8 @@ def _without_root(
             break
         items = [replace(item, parts=item.parts[1:]) if len(item.parts) > 1 else item for item in items]
         folders = sorted({item.parts[0] for item in items if len(item.parts) > 1})
+        if {*folders} == {_DRAFTS, _HANDED_IN}:
+            return _without_root(items, folders, zipped, accepted)
     return list(items), list(folders)
 
 

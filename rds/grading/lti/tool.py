@@ -126,7 +126,8 @@ def _launched(data: Mapping[str, Any]) -> Launched:
     user, email = str(data.get("sub") or ""), str(data.get("email") or "")
     if not user:
         raise Refused("the platform does not say who it is; switch on that it sends its users' identifiers")
-    if not any(str(role).endswith(("#Learner", "#Student")) for role in data.get(_ROLES) or ()):
+    roles = {str(role).rpartition("#")[2] for role in data.get(_ROLES) or ()}  # in LTI also without their address
+    if not roles & {"Learner", "Student"}:
         raise Refused("only students hand in; to try it, open it in a student's role")
     endpoint = data.get(_AGS) or {}
     return Launched(

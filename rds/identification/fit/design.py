@@ -120,7 +120,8 @@ def design_tracking(
     for `linear_axis_of`, and for poles too fast for the sampled loop.
     """
     axis = linear_axis_of(model)
-    options: dict[str, Any] = {"poles": [*poles], "observer_pole": observer_pole}
+    given = [*poles] if hasattr(poles, "__iter__") else poles  # one number is refused where all others are
+    options: dict[str, Any] = {"poles": given, "observer_pole": observer_pole}
     return tracking.make({"tau": axis.tau, "K": axis.K}, sample_period, voltage_range, **options)
 
 

@@ -143,7 +143,7 @@ def _dates(path: Path) -> dict[str, np.ndarray]:
         for field in parquet.read_schema(path):
             if pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type):
                 is_date = pa.types.is_timestamp(field.type)
-                column = parquet.read_table(path, columns=[field.name]).column(0)
+                column = parquet.read_table(path, columns=[field.name], page_checksum_verification=True).column(0)
                 exact = column.cast(pa.timestamp("ns") if is_date else pa.duration("ns")).to_numpy()
                 if is_date:
                     found[field.name] = since_first(exact.astype("datetime64[ns]"))

@@ -7,6 +7,7 @@ FILE.map.toml, or guessed where names and units leave no doubt.
 from __future__ import annotations
 
 from collections.abc import Callable
+from os import PathLike
 from pathlib import Path
 
 from rds.core.errors import InputError
@@ -27,6 +28,11 @@ def read_log(
     and the remedy, for a file or map that cannot be read, a meaning that is in doubt (with a map to paste), cells
     that are no numbers, and times that are not as regular as the map demands.
     """
+    if not isinstance(path, str | PathLike):
+        said = (
+            f"a {type(path).__name__} is no file; save it, as pandas does by to_parquet('log.parquet'), and name that"
+        )
+        raise InputError(said)
     path = Path(path)
     chosen = choose_map(path, mapping)
     if chosen is None and is_own(path):

@@ -25,7 +25,7 @@ class Workspace:
     points: np.ndarray
     low: np.ndarray  # (3,)
     high: np.ndarray  # (3,)
-    tilt: float  # degrees: the largest angle between two directions of the tool, seen from its first one
+    tilt: float  # degrees: the largest angle between the tool and its direction with the joints at home
 
     @property
     def is_empty(self) -> bool:
@@ -43,7 +43,8 @@ def workspace(kinematics: Kinematics, within: str = "limits", n: int = 20_000, s
     corners = np.array(np.meshgrid(*np.stack([low, high], 1), indexing="ij")).reshape(len(low), -1).T
     poses = kinematics.forward(np.concatenate([q, corners[: 2**12]]))
     points, z = poses[:, :3, 3], poses[:, :3, 2]
-    tilt = np.degrees(np.arccos(np.clip(z @ z[0], -1.0, 1.0))).max() if np.ptp(z, axis=0).max() > 1e-12 else 0.0
+    home = kinematics.forward(kinematics.home)[:3, 2]
+    tilt = np.degrees(np.arccos(np.clip(z @ home, -1.0, 1.0))).max() if np.ptp(z, axis=0).max() > 1e-12 else 0.0
     return Workspace(points, points.min(axis=0), points.max(axis=0), float(tilt))
 
 

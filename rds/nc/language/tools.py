@@ -143,7 +143,7 @@ def _read_line(text: str, file: str, line: int) -> Tool | None:
         found[letter] = value
     if not found:
         return None
-    if "T" not in found or "P" not in found or found["T"] < 1:
+    if "T" not in found or "P" not in found or found["T"] < 0:  # T0 is a slot that LinuxCNC counts, and no tool
         raise ProgramError("a tool needs its number T (from 1) and its pocket P; add them", file=file, line=line)
     offset: Sequence[float] = [found.get(letter, 0.0) for letter in "XYZABC"]
     if any(found.get(letter) for letter in "UVW"):

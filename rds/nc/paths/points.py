@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -188,6 +189,21 @@ def _headings(text: str) -> Iterator[tuple[str, str | None] | None]:
         at = match.end()
 
 
+def _pieces(points: Any) -> list[np.ndarray]:
+    try:
+        alone = np.asarray(points, dtype=float)
+    except (TypeError, ValueError):  # pieces of different lengths, or what is no number
+        alone = np.empty(0)
+    try:
+        pieces = [alone] if alone.ndim == 2 else [np.asarray(piece, dtype=float) for piece in points]
+    except (TypeError, ValueError) as error:
+        raise InputError(f"points must be numbers in mm: {error}; read_points reads a file") from error
+    for piece in pieces:
+        if piece.ndim != 2 or piece.shape[1] not in (2, 3):
+            raise InputError(f"points of shape {piece.shape}; give x, y or x, y, z of each in a row, mm")
+    return pieces
+
+
 def path_of_points(
     points: PointFile | Sequence[np.ndarray],
     feed_rate: float,
@@ -198,11 +214,12 @@ def path_of_points(
 ) -> tuple[list[Segment], float]:
     """The path through points, and how far it is at most from the lines between them, mm (0 for lines).
 
-    `points`: a `PointFile`, or pieces of shape (n, 2) or (n, 3) in mm. `depth` (mm) puts points without z at
-    z = -depth; `closed` leads each piece back to its first point; with `tolerance` (mm) lines and arcs that stand for
-    several points are fitted (see `arc_fit.fit`). `feed_rate` in mm/s. InputError where depth is given beside z.
+    `points`: a `PointFile`, or an array of shape (n, 2) or (n, 3) in mm, or several of them, the pieces. `depth` (mm)
+    puts points without z at z = -depth; `closed` leads each piece back to its first point; with `tolerance` (mm) lines
+    and arcs that stand for several points are fitted (see `arc_fit.fit`). `feed_rate` in mm/s. InputError where depth
+    is given beside z.
     """
-    arrays = points.pieces if isinstance(points, PointFile) else [np.asarray(piece, dtype=float) for piece in points]
+    arrays = points.pieces if isinstance(points, PointFile) else _pieces(points)
     has_z = points.has_z if isinstance(points, PointFile) else any(array.shape[1] == 3 for array in arrays)
     if has_z and depth is not None:
         raise InputError("points: their z and a depth are both given; leave the depth out, or the column z")
