@@ -41,6 +41,12 @@ def estimate_start(
     return tuple(float(value) for value in found)
 
 
+def first_velocities(structure: Structure, t: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """The lowest and highest velocity that the samples show at their beginning, with `estimate_start`'s slack."""
+    _, low, high = _first_guess(structure.states, t, y)
+    return float(low[1]), float(high[1])
+
+
 def _search(
     structure: Structure,
     values: Mapping[str, float],
