@@ -235,6 +235,16 @@ def test_a_stretch_of_another_regime_is_pointed_at_in_time() -> None:
     assert 3.8 <= begin <= 4.2 and 5.1 <= end <= 5.7
 
 
+def test_rounding_where_the_axis_creeps_is_no_other_regime() -> None:
+    """There a step of the encoder lasts longer than a block, and an exact model was said to lack something."""
+    t, axis = np.arange(4000) * 0.001, make()
+    values = {"tau": 0.01, "K": 14.0, "friction_plus": 5.0, "friction_minus": -5.0}
+    u = np.repeat(np.random.default_rng(1).uniform(-4.0, 4.0, 20), 200)
+    u[2000:2300] = (5.0 + 0.012) / 14.0  # at 0.012 mm/s: a quarter of a step in a block
+    log = Log("creeps", t, u, np.round(axis.respond(t, u, (0.0, 0.0), values), 3), resolution=0.001)
+    assert not any("another regime" in warning for warning in fit([log], axis).warnings)
+
+
 def speed_levels(name: str, torques: tuple[float, float], speeds: tuple[float, float]) -> Log:
     """From rest to one speed within a few seconds, and after 10 s to another (Nm, rad/s), as a motor was logged."""
     t, position, velocity, places = np.arange(2000) * 0.01, 0.0, 0.0, []
