@@ -146,6 +146,20 @@ def test_the_needed_voltage_counts_the_delay_of_commands_before_a_block() -> Non
     assert found.relative_percent is not None and found.relative_percent < 5.0
 
 
+def test_commands_from_before_a_log_count_in_its_initial_state() -> None:
+    """They act on where there is a delay. The velocity of an exact model was held where the log never begins."""
+    axis, values = structure("axis", ("delay",)), X | {"tau": 0.04, "delay": 0.01}
+    u = np.random.default_rng(1).choice([-5.0, 5.0], 600)
+    t = np.arange(len(u)) * 0.01
+    y = axis.respond(t, u, (0.0, 0.0), values)
+    for begin in range(100, 400, 20):
+        part = slice(begin, begin + 200)
+        few = slice(begin, begin + 20)
+        start = estimate_start(axis, values, t[few], u[few], y[few])
+        error = axis.respond(t[part], u[part], start, values) - y[part]
+        assert np.abs(error[20:]).max() < 0.01 * np.ptp(y[part])
+
+
 def test_no_voltage_explains_motion_that_the_model_cannot_make() -> None:
     data = made_log(square(3.0))
     found = needed_voltage(data, STRUCTURE, X | {"K": 1e-9}, smoothed_velocity(data, 20, False), 20, False)

@@ -68,13 +68,15 @@ def other_doubts(structure: Structure, log: Log, error: np.ndarray, method: str)
     return said
 
 
-def leap_doubts(structure: Structure, log: Log, begun: float, free_run: Errors) -> list[str]:
+def leap_doubts(
+    structure: Structure, values: Mapping[str, float], log: Log, begun: float, free_run: Errors
+) -> list[str]:
     """Doubts where a fit began the free run at the velocity `begun`, which the first samples do not show.
 
     A wrong model hides its error so. `free_run` begins in the state that the first samples show.
     """
     first = initial_samples(len(log))
-    low, high = first_velocities(structure, log.time[:first], log.position[:first])
+    low, high = first_velocities(structure, values, log.time[:first], log.command[:first], log.position[:first])
     slack = _LEAP * float(np.abs(motion_of(log).velocity).max())
     if low - slack <= begun <= high + slack or not free_run.fit_percent < _POOR:
         return []

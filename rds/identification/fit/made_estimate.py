@@ -86,7 +86,7 @@ def made_estimate(
         if judged and states is None and not log.closed_loop:
             said += other_doubts(structure, log, log.position - modelled, method)
         if state is not None and not log.closed_loop and _has_velocity(structure):
-            said += leap_doubts(structure, log, state[1], free_run[log.name])
+            said += leap_doubts(structure, values, log, state[1], free_run[log.name])
         if log.closed_loop:
             said.append(
                 f"{log.name} is closed-loop data: the command answers the axis's noise and friction, which biases any "
@@ -157,8 +157,8 @@ def _too_slow(logs: Sequence[Log], parameters: Mapping[str, Parameter], method: 
 
 
 def _has_velocity(structure: Structure) -> bool:
-    """Whether the second state is a velocity for sure: that of a model of one's own may be anything."""
-    return structure.sensitivities is not None and structure.state_names[1:2] == ("velocity",)
+    """Whether the log shows the second state: that of a model of one's own may be anything, and play hides it."""
+    return structure.sensitivities is not None and structure.state_names == ("position", "velocity")
 
 
 def _none_told(parameters: Mapping[str, Parameter]) -> bool:
