@@ -238,6 +238,15 @@ def test_what_a_friction_curve_cannot_tell() -> None:
         friction_curve([Log("sine", t, np.sin(6 * t), 10 * np.sin(9 * t), units={"position": "mm/s"})])
 
 
+def test_a_friction_curve_names_the_logs_that_gave_no_point() -> None:
+    """The slow runs of a robot's joint were left out without a word, and a faster one was called the slowest."""
+    t = np.arange(4000) * T
+    slow = Log("slow", t, 10 + np.sin(9 * t), 2.0 + np.sin(9 * t), units={"position": "mm/s", "command": "N"})
+    found = friction_curve([steady([20.0, 30.0, 40.0]), slow])
+    assert {point.log for point in found.points} == {"runs"}
+    assert any(sentence.startswith("slow: no stretch of these logs") for sentence in found.unidentifiable)
+
+
 def test_a_torque_against_the_motion_is_a_fault() -> None:
     log = turning(1)
     assert not any(f.kind == "sign" for f in with_findings(log).findings)

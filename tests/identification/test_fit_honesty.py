@@ -11,6 +11,7 @@ from rds.core.errors import InputError
 from rds.identification.fit.fit import fit
 from rds.identification.logs.log import Log
 from rds.identification.structures.axis_structure import make
+from rds.identification.structures.structures import structure
 from rds.identification.validate.validate import validate
 from tests.identification.fit_logs import axis_log, mini_cnc
 
@@ -232,3 +233,37 @@ def test_a_stretch_of_another_regime_is_pointed_at_in_time() -> None:
     (said,) = [w for w in found.warnings if "another regime" in w]
     begin, end = (float(word) for word in said.split(" s the log")[0].split("from ")[1].split(" to "))
     assert 3.8 <= begin <= 4.2 and 5.1 <= end <= 5.7
+
+
+def test_rounding_where_the_axis_creeps_is_no_other_regime() -> None:
+    """There a step of the encoder lasts longer than a block, and an exact model was said to lack something."""
+    t, axis = np.arange(4000) * 0.001, make()
+    values = {"tau": 0.01, "K": 14.0, "friction_plus": 5.0, "friction_minus": -5.0}
+    u = np.repeat(np.random.default_rng(1).uniform(-4.0, 4.0, 20), 200)
+    u[2000:2300] = (5.0 + 0.012) / 14.0  # at 0.012 mm/s: a quarter of a step in a block
+    log = Log("creeps", t, u, np.round(axis.respond(t, u, (0.0, 0.0), values), 3), resolution=0.001)
+    assert not any("another regime" in warning for warning in fit([log], axis).warnings)
+
+
+def speed_levels(name: str, torques: tuple[float, float], speeds: tuple[float, float]) -> Log:
+    """From rest to one speed within a few seconds, and after 10 s to another (Nm, rad/s), as a motor was logged."""
+    t, position, velocity, places = np.arange(2000) * 0.01, 0.0, 0.0, []
+    for instant in t:
+        places.append(position)
+        target = np.degrees(speeds[int(instant >= 10.0)])
+        position += 0.01 * target + (velocity - target) * 1.6 * -np.expm1(-0.01 / 1.6)
+        velocity = target + (velocity - target) * np.exp(-0.01 / 1.6)
+    torque, units = np.where(t < 10.0, *torques), {"position": "deg", "command": "Nm"}
+    return Log(name, t, torque, np.array(places), resolution=0.01, units=units, closed_loop=False)
+
+
+def test_a_leap_of_the_initial_velocity_that_hides_an_error_is_told() -> None:
+    """Friction that no structure here has: least squares began the motors, which rest, at up to -5450 deg/s."""
+    logs = [
+        speed_levels("back", (-0.03, -0.04), (-143.0, -183.0)),
+        speed_levels("forth", (0.05, 0.06), (139.5, 214.3)),
+    ]
+    found = fit(logs, structure("axis-inertia", output="deg", command="Nm"), method="simulation")
+    sentences = [warning for warning in found.warnings if "the fit begins the free run at" in warning]
+    assert [sentence.split(":")[0] for sentence in sentences] == ["back", "forth"]
+    assert all("do not use these parameters" in sentence for sentence in sentences)

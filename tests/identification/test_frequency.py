@@ -91,6 +91,9 @@ def test_friction_biases_as_its_describing_function_says_and_no_coherence_shows_
     (warning,) = [warning for warning in estimate.warnings if "Coulomb friction" in warning]
     said = re.search(r"some ([\d.]+) % here, where F is about 0.38 mm/s", warning)
     assert said and float(said[1]) == pytest.approx(100.0 * (1.0 - predicted), abs=0.5) and UNUSABLE not in warning
+    turning = replace(axis_log(BOTH_WAYS), units={"position": "deg", "command": "V"})
+    turned = fit([turning], structure("axis", output="deg"), "frequency").warnings
+    assert any("where F is about 0.38 deg/s" in warning for warning in turned)
     slow = fit([axis_log(multisine(2.0, 0.5, 0.5, 60.0))], structure("axis"), "frequency")
     assert slow.values()["K"] / K < 0.8
     assert slow.unusable()

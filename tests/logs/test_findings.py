@@ -314,3 +314,13 @@ def test_ripples_of_a_filter_are_no_leaps_of_an_encoder(tmp_path: Path) -> None:
     columns["position [mm]"] = position + 0.1 * (t > 0.7005)
     (log,) = read_log(write(tmp_path / "slip.csv", columns))
     assert ["at 0.701 s by +0." in f.what for f in log.findings if f.kind == "leap"] == [True]
+
+
+def test_levels_that_are_each_held_are_no_limit(tmp_path: Path) -> None:
+    """Random levels of one length each: the highest was taken for a limit. Clipped levels are alike more than once."""
+    levels = np.random.default_rng(0).uniform(-6.0, 6.0, 60)
+    held = np.repeat(levels, 100)
+    columns = axis(6000) | {"voltage": held}
+    assert "saturation" not in grave(read(tmp_path, columns))
+    clipped = np.clip(held, -4.0, 4.0)
+    assert "limited?" in grave(read(tmp_path, columns | {"voltage": clipped}))["saturation"].what

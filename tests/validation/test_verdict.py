@@ -145,7 +145,9 @@ def test_the_fit_s_own_data_are_known_with_noise_resampled_and_thinned_out() -> 
     between = np.interp(t, first.time, first.position)
     resampled = replace(first, time=t, command=FRESH[:-1], position=between, resolution=None, name="resampled")
     later = replace(noisy, time=noisy.time + 100.0, name="later")
-    for data in (noisy, half, resampled, later, noisy.part(1000, 7000)):
+    mean = np.convolve(np.pad(first.position, 4, "edge"), np.ones(9) / 9, "valid")
+    smooth = replace(first, position=mean, resolution=None, name="smooth")
+    for data in (noisy, half, resampled, later, smooth, noisy.part(1000, 7000)):
         known = overlap(seen, data)
         assert known.known and known.share > 0.9 and "the same motion" in known.how, data.name
     found = validate(seen, half)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rds.identification.fit.estimate import UNUSABLE, Errors
+from rds.identification.fit.initial_state import first_velocities, initial_samples
 from rds.identification.fit.kstep import over_noise
 from rds.identification.fit.smoothing import Motion, motion_of
 from rds.identification.logs.excitation import is_steady
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 _POOR = 90.0  # per cent: a model that fits worse does not explain the motion
 MISSED = 1.5  # times the measurement's noise: residuals that are larger hold something else
+_LEAP = 0.05  # of the highest speed: by how much a fitted initial velocity may leave those that the log shows
 _FAR = 10.0  # times what noise makes of a prediction: it is off by more than noise and intervals explain
 _LITTLE = 100.0  # times the measurement's noise: with less motion than that, a fit is not told by much
 _NONE = 12.0  # times the noise: it alone spans 8 in 10^4 samples, 10.4 in 10^7
@@ -64,6 +66,26 @@ def other_doubts(structure: Structure, log: Log, error: np.ndarray, method: str)
             f"with --method simulation{'' if log.closed_loop is False else _OR_HELD}"
         )
     return said
+
+
+def leap_doubts(
+    structure: Structure, values: Mapping[str, float], log: Log, begun: float, free_run: Errors
+) -> list[str]:
+    """Doubts where a fit began the free run at the velocity `begun`, which the first samples do not show.
+
+    A wrong model hides its error so. `free_run` begins in the state that the first samples show.
+    """
+    first = initial_samples(len(log))
+    low, high = first_velocities(structure, values, log.time[:first], log.command[:first], log.position[:first])
+    slack = _LEAP * float(np.abs(motion_of(log).velocity).max())
+    if low - slack <= begun <= high + slack or not free_run.fit_percent < _POOR:
+        return []
+    unit = structure.output_unit
+    return [
+        f"{log.name}: the fit begins the free run at {begun:.4g} {unit}/s, and the log begins at {low:.4g} to "
+        f"{high:.4g} {unit}/s; from there these parameters explain {free_run.fit_percent:.1f} % of the motion only: "
+        f"{UNUSABLE}; try other options, other structures or another method"
+    ]
 
 
 def held_doubts(structure: Structure, log: Log, predicted: Mapping[int, Errors]) -> list[str]:

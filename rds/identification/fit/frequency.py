@@ -29,6 +29,7 @@ from rds.identification.fit.made_estimate import made_estimate
 from rds.identification.fit.regression import regress
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.logs.log import Log
+from rds.identification.structures.signals import SPEEDS
 from rds.identification.structures.structure import Structure
 
 STRUCTURES: Mapping[str, tuple[str, ...]] = {"spindle": ("delay",), "axis": ("delay",)}  # and their options
@@ -216,15 +217,16 @@ def _of_reversing(log: Log) -> str:
     from rds.identification.structures.axis_structure import make
 
     size = float(np.sqrt(2.0) * np.std(motion_of(log).velocity))
+    unit = SPEEDS[log.units.get("position", "mm")]
     said = (
         f"{log.name}: the axis reverses, so Coulomb friction F makes K and tau too small by a factor of about "
-        f"1/(1 + 4F/(π·{size:.3g} mm/s)), and no coherence shows it"
+        f"1/(1 + 4F/(π·{size:.3g} {unit})), and no coherence shows it"
     )
     try:
         found = simulation_error.estimate([log.part(0, min(len(log), _ENOUGH))], make(), {}).values()
         friction = 0.5 * (found["friction_plus"] - found["friction_minus"])
         loss = 100.0 * (1.0 - 1.0 / (1.0 + 4.0 * friction / (np.pi * size)))
-        said += f": some {loss:.2g} % here, where F is about {friction:.2g} mm/s"
+        said += f": some {loss:.2g} % here, where F is about {friction:.2g} {unit}"
         said += f": {UNUSABLE}" if loss > _LOST else ""
     except InputError:  # then there is more to say against the log than this
         pass

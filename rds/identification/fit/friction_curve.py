@@ -103,6 +103,11 @@ def friction_curve(logs: Sequence[Log]) -> FrictionCurve:
             ", ".join(log.name for log in logs),
         )
     unidentifiable = ["inertia, time constant and delay: at constant speed nothing accelerates"]
+    if unused := [log.name for log in logs if log.name not in {point.log for point in points}]:
+        unidentifiable.append(
+            f"{', '.join(unused)}: no stretch of these logs keeps its speed within {100 * _STEADY:g} %, so nothing of "
+            "them is in the curve"
+        )
     directions: dict[str, Mapping[str, Told]] = {}
     for way, name in ((1.0, "forward"), (-1.0, "backward")):
         of_way = [point for point in points if way * point.speed > 0.0]
@@ -180,7 +185,7 @@ def _fitted(
     f = np.array([way * point.force for point in points])
     slowest, fastest = float(v.min()), float(v.max())
     speeds = int(np.count_nonzero(np.diff(np.sort(v)) > (_SAME_SPEED - 1.0) * np.sort(v)[:-1])) + 1
-    said = [f"static friction, and anything below {slowest:.3g} {speed_unit}, the slowest run"]
+    said = [f"static friction, and anything below {slowest:.3g} {speed_unit}, the slowest of these points"]
     if speeds < 2:
         error = float(f.std(ddof=1) / np.sqrt(len(f))) if len(f) > 1 else float(points[0].error)
         said.append(f"viscous friction: all runs are at {v.mean():.3g} {speed_unit}, and F_c is all friction there")

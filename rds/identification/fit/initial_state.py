@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import expm1
 
 import numpy as np
 
@@ -33,12 +34,29 @@ def estimate_start(
     finite, the search ends with the best state so far.
     """
     x, low, high = _first_guess(structure.states, t, y)
+    low[1:2] -= (unknown := _unknown_change(values, u))
+    high[1:2] += unknown
     free = np.ones(len(x), dtype=bool)
     found = _search(structure, values, t, u, y, x, free)
     within = np.clip(found, low, high)
     if (within != found).any():
         found = _search(structure, values, t, u, y, within, within == found)
     return tuple(float(value) for value in found)
+
+
+def first_velocities(
+    structure: Structure, values: Mapping[str, float], t: np.ndarray, u: np.ndarray, y: np.ndarray
+) -> tuple[float, float]:
+    """The lowest and highest velocity that the samples show at their beginning, with `estimate_start`'s slack."""
+    _, low, high = _first_guess(structure.states, t, y)
+    unknown = _unknown_change(values, u)
+    return float(low[1]) - unknown, float(high[1]) + unknown
+
+
+def _unknown_change(values: Mapping[str, float], u: np.ndarray) -> float:
+    """By how much commands from before the log may change the velocity, which a delay brings into its beginning."""
+    delay, tau, K = (values.get(name, 0.0) for name in ("delay", "tau", "K"))
+    return float(np.ptp(u)) * abs(K) * -expm1(-delay / tau) if delay > 0.0 and tau > 0.0 else 0.0
 
 
 def _search(

@@ -13,7 +13,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, names_of, said_of_guesses
-from rds.identification.fit.free_run_doubts import held_doubts, other_doubts
+from rds.identification.fit.free_run_doubts import held_doubts, leap_doubts, other_doubts
 from rds.identification.fit.initial_state import estimate_start, initial_samples
 from rds.identification.fit.kstep import ahead, errors_of
 from rds.identification.logs.excitation import is_steady
@@ -85,6 +85,8 @@ def made_estimate(
         free_run[log.name], predictions[log.name] = _errors(structure, log, values, modelled)
         if judged and states is None and not log.closed_loop:
             said += other_doubts(structure, log, log.position - modelled, method)
+        if state is not None and not log.closed_loop and _has_velocity(structure):
+            said += leap_doubts(structure, values, log, state[1], free_run[log.name])
         if log.closed_loop:
             said.append(
                 f"{log.name} is closed-loop data: the command answers the axis's noise and friction, which biases any "
@@ -152,6 +154,11 @@ def _too_slow(logs: Sequence[Log], parameters: Mapping[str, Parameter], method: 
         f"the log tells that tau is below {1e3 * most:.3g} ms, and no more. A period of {1e3 * _ROUND * most:.2g} ms "
         f"tells a time constant of {1e3 * most:.3g} ms; for a shorter one, sample by as much faster (a fifth of it)"
     ]
+
+
+def _has_velocity(structure: Structure) -> bool:
+    """Whether the log shows the second state: that of a model of one's own may be anything, and play hides it."""
+    return structure.sensitivities is not None and structure.state_names == ("position", "velocity")
 
 
 def _none_told(parameters: Mapping[str, Parameter]) -> bool:

@@ -60,6 +60,7 @@ def needed_voltage(
 
     With `is_rate` (a spindle) the output is the speed itself, and the state begins at it.
     """
+    given, values = _acting(log, structure, values)
     count = (len(log) - 1) // block
     chosen = np.unique(np.linspace(0, count - 1, min(count, _BLOCKS)).astype(int)) if count > 0 else np.empty(0, int)
     least = _STEPS_OF_ENCODER * (log.resolution or 0.0)
@@ -80,17 +81,32 @@ def needed_voltage(
         states[:, structure.state_names.index(PLAY)] = np.sign(moved)  # it moves that way, pushed by the motor
     blocks = Blocks(rows[:, 0].copy(), block, states, position[:, -1].copy(), trial, _FAR * trial, _ROUNDS)
     lands = structure.lands or partial(_lands, structure)
-    extra = lands(log.time, log.command, blocks, values)
+    extra = lands(log.time, given, blocks, values)
     found = np.isfinite(extra)
     rows = rows[found]
     return NeededVoltage(
         block,
         time=log.time[rows[:, 0] + block // 2],
         velocity=speed[found].mean(axis=1),
-        command=log.command[rows[:, :-1]].mean(axis=1),
+        command=given[rows[:, :-1]].mean(axis=1),
         extra=extra[found],
         left_out=len(chosen) - len(rows),
     )
+
+
+def _acting(log: Log, structure: Structure, values: Mapping[str, float]) -> tuple[np.ndarray, Mapping[str, float]]:
+    """The mean command that acts in each sample, and the parameters with which it acts at once.
+
+    A block knows nothing of the commands before it, and they act in its first samples where there is a delay.
+    """
+    delay = 0.0 if structure.sensitivities is None else values.get("delay", 0.0)  # a file of one's own has its own
+    if delay == 0.0:
+        return log.command, values
+    t, u = log.time, log.command
+    sums = np.concatenate([[0.0], np.cumsum(u[:-1] * np.diff(t))])
+    late = t - delay
+    until = np.interp(late, t, sums) + u[0] * np.minimum(late - t[0], 0.0)
+    return np.append(np.diff(until) / np.diff(t), u[-1]), {**values, "delay": 0.0}
 
 
 def _lands(

@@ -31,7 +31,8 @@ def suspicions(problem: Problem, solution: Solution, uncertainty: Uncertainty) -
     for number, log in enumerate(problem.logs):
         error = problem.residuals(solution.point, number)[0]
         said += fitted_doubts(problem.structure, log, error)
-        found = upsets(log.time, error, motion_of(log).noise, problem.structure.output_unit, log.position - error)
+        noise, unit = motion_of(log).noise, problem.structure.output_unit
+        found = upsets(log.time, error, noise, unit, log.position - error, log.resolution)
         said += [f"{log.name}: {sentence}" for sentence in found]
     return said + _twins(problem.names, uncertainty)
 

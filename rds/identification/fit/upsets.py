@@ -23,8 +23,13 @@ _WITHIN, _SUDDEN = 4, 0.5  # samples to either side, within which a leap makes s
 _ALL = 0.8  # of the squares of a model's accelerations
 
 
-def upsets(time: np.ndarray, error: np.ndarray, noise: float, unit: str, modelled: np.ndarray) -> list[str]:
+def upsets(
+    time: np.ndarray, error: np.ndarray, noise: float, unit: str, modelled: np.ndarray, resolution: float | None = None
+) -> list[str]:
     """Sentences on where `error` (samples,), measured minus `modelled`, steps or wanders; `noise` is its floor.
+
+    Where the axis is slow, rounding by an encoder of `resolution` moves a block's median by up to a step of it, and
+    hardly elsewhere: what changes by no more is no regime.
 
     A stretch that holds nearly all accelerations of the model is none of another regime: elsewhere it has nothing to be
     wrong in.
@@ -43,7 +48,7 @@ def upsets(time: np.ndarray, error: np.ndarray, noise: float, unit: str, modelle
     size = np.abs(steps - np.median(steps))
     found = [
         regime
-        for regime in _regimes(size, usual, starts, unit)
+        for regime in _regimes(size, usual, resolution or 0.0, starts, unit)
         if not _holds_all(modelled[: count * width].reshape(count, width).mean(axis=1), regime, unit)
     ]
     inside = np.zeros(len(steps), dtype=bool)
@@ -85,9 +90,14 @@ def _leap(time: np.ndarray, error: np.ndarray, block: int, width: int, unit: str
     )
 
 
-def _regimes(size: np.ndarray, usual: float, starts: np.ndarray, unit: str) -> list[tuple[int, int, str]]:
-    """Stretches whose steps are several times as large as usual: first and end as numbers of steps, and a sentence."""
-    wide = np.convolve(size, np.ones(_RUN) / _RUN, "same") > _OTHER * usual
+def _regimes(
+    size: np.ndarray, usual: float, rounded: float, starts: np.ndarray, unit: str
+) -> list[tuple[int, int, str]]:
+    """Stretches whose steps are several times as large as usual, and more than what is `rounded`: first and end as
+    numbers of steps, and a sentence.
+    """
+    least = max(_OTHER * usual, rounded)
+    wide = np.convolve(size, np.ones(_RUN) / _RUN, "same") > least
     edges = np.flatnonzero(np.diff(np.concatenate([[0], wide.astype(np.int8), [0]])))
     for calm_from, calm_to in zip(edges[1:-1:2].tolist(), edges[2::2].tolist(), strict=True):
         if calm_to - calm_from <= 3 * _RUN:  # a pause of one regime, as where the axis rests
@@ -95,7 +105,7 @@ def _regimes(size: np.ndarray, usual: float, starts: np.ndarray, unit: str) -> l
     edges = np.flatnonzero(np.diff(np.concatenate([[0], wide.astype(np.int8), [0]])))
     found = []
     for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        large = size[first:end] > _OTHER * usual
+        large = size[first:end] > least
         if int(large.sum()) < _RUN or end - first > _MOST * len(size):
             continue
         where = first + np.flatnonzero(large)

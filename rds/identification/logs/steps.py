@@ -93,8 +93,11 @@ def saturation(log: Log, axis: Axis | None) -> list[Finding]:
             gravity = Gravity.WARNING if share > _MANY else Gravity.NOTE
             found.append(Finding("saturation", what, gravity, int(np.argmax(at))))
     elif len(np.unique(command[:_LOOKED_AT])) > _LEVELS:
+        usual = _usual_run(command)
         for value in (low, high):
             at = command == value
+            if usual >= _HELD and np.count_nonzero(np.diff(at, prepend=False) & at) == 1 and _longest(at) <= 2 * usual:
+                continue  # of levels that are each held, the highest is held as well
             if at.mean() > _MANY and _longest(at) >= _HELD:
                 share = 100 * float(at.mean())
                 what = f"command stays at {value:g} {unit}, its extreme, in {share:.3g} % of the samples: limited?"
@@ -124,6 +127,12 @@ def _ends(log: Log, axis: Axis | None) -> list[Finding]:
             what = f"position stays at {value:g} {unit}, its extreme, against the command from sample {k}: an end stop?"
             return [Finding("saturation", what, Gravity.WARNING, k)]
     return []
+
+
+def _usual_run(values: np.ndarray) -> float:
+    """The median length of the runs of one value."""
+    edges = np.flatnonzero(np.diff(values))
+    return float(np.median(np.diff(np.concatenate([[-1], edges, [len(values) - 1]]))))
 
 
 def _longest(mask: np.ndarray) -> int:

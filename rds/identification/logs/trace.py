@@ -30,11 +30,14 @@ def trace(log: Log) -> str:
     return f"{begin:.9g} {end - begin:.9g} " + " ".join(f"{p:.6g}" for p in places - places.mean())
 
 
-def retraced(log: Log, known: str) -> float:
-    """The share (0 to 1) of the log that is the motion of the trace `known`, within the noise of the log."""
+def retraced(log: Log, known: str, resolution: float = 0.0) -> float:
+    """The share (0 to 1) of the log that is the motion of the trace `known`, within the noise of the log.
+
+    `resolution` is that of the trace's encoder: a filtered copy has no noise of its own, and is as far off as rounding.
+    """
     begin, length, places = _read(known)
     own = float(log.time[-1] - log.time[0])
-    allowed = _TIMES * max(noise(log.position), log.resolution or 0.0)
+    allowed = _TIMES * max(noise(log.position), log.resolution or 0.0, resolution)
     times = begin + np.linspace(0.0, length, _POINTS)
     starts = [0.0]  # by the times themselves
     if abs(own / length - 1.0) < _AS_LONG:

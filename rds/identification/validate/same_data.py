@@ -41,8 +41,8 @@ def overlap(candidate: Candidate, log: Log) -> Overlap:
         else:
             how = "the file is another, but holds the same numbers as the fit's data"
         return Overlap(alike, how, known=True)
-    traces = [str(fitted["trace"]) for fitted in candidate.fitted_on if fitted.get("trace")]
-    again = max((retraced(log, trace) for trace in traces), default=0.0)
+    traced = [fitted for fitted in candidate.fitted_on if fitted.get("trace")]
+    again = max((retraced(log, str(f["trace"]), float(f.get("resolution") or 0.0)) for f in traced), default=0.0)
     if again > 0.0 and not (log.sha256 and log.sha256 in hashes):
         how = "other numbers, but the same motion as the fit's data, at the same times and within the noise"
         return Overlap(again, how, known=True)
