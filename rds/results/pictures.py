@@ -5,22 +5,13 @@ Imports matplotlib, and so is called where that is imported already: see `rds.co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from rds.results.late_samples import total_time
 from rds.results.plots import overview
 from rds.results.plots_signals import signals
 from rds.results.plots_timing import timing
+from rds.results.report import Pictures
 from rds.results.result import Result
 from rds.results.signals import signals_of
-
-
-@dataclass(frozen=True)
-class Pictures:
-    """PNG files: `axes` the overview of each axis by its name, `report` what the report shows, by its title."""
-
-    axes: dict[str, bytes]
-    report: dict[str, bytes]
 
 
 def pictures(result: Result) -> Pictures:

@@ -7,7 +7,7 @@ from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 from urllib.parse import quote
 
 from rds.core.atomic import write_files
@@ -19,6 +19,16 @@ from rds.results.units import heading
 
 # no script, nothing loaded from outside, even if a text from a student's file slipped through
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+
+
+class Pictures(NamedTuple):
+    """PNG files of a run: `axes` the overview of each axis by its name, `report` what the report shows, by its title.
+
+    Here and not where they are drawn, so that who gets them from another process need not import matplotlib.
+    """
+
+    axes: dict[str, bytes]
+    report: dict[str, bytes]
 
 
 def write_report(

@@ -92,6 +92,22 @@ def _experiment(folder: Path) -> Path:
     return folder / "first.toml"
 
 
+def test_the_run_itself_imports_no_matplotlib(tmp_path: Path) -> None:
+    code = """
+import sys
+from pathlib import Path
+from rds.core import drawing
+drawing.begin("rds.results.pictures")
+from rds.modes.experiment.report import run_and_save
+run_and_save(Path("first.toml"), None, Path("out"), None)
+print("matplotlib" in sys.modules)
+"""
+    _experiment(tmp_path)
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.stdout == "False\n", done.stderr
+
+
 def test_a_run_leaves_the_same_pictures_with_it_and_without(tmp_path: Path) -> None:
     _experiment(tmp_path)
     without = "import os; del os.fork; from rds.__main__ import main; main()"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rds.core import drawing
 from rds.core.atomic import write_whole
@@ -16,10 +16,7 @@ from rds.modes.loop.program import InterpolatedProgram, Program
 from rds.modes.process.host import Progress
 from rds.results import Result
 from rds.results.files import saved_files
-from rds.results.report import write_report
-
-if TYPE_CHECKING:
-    from rds.results.pictures import Pictures
+from rds.results.report import Pictures, write_report
 
 PICTURES = "rds.results.pictures"  # the module that draws them
 METRICS = ("mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_abs_error", "rms_error", "fit_percent")
