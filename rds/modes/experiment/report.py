@@ -16,9 +16,8 @@ from rds.modes.loop.program import InterpolatedProgram, Program
 from rds.modes.process.host import Progress
 from rds.results import Result
 from rds.results.files import saved_files
-from rds.results.report import Pictures, write_report
+from rds.results.report import DRAWN_BY, Pictures, write_report
 
-PICTURES = "rds.results.pictures"  # the module that draws them
 METRICS = ("mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_abs_error", "rms_error", "fit_percent")
 STAGE_FIGURES = ("p50", "p99", "p999", "max")
 
@@ -78,7 +77,7 @@ def save_with_report(
 
 def pictures_of(result: Result) -> Callable[[], Pictures]:
     """Begin to draw a run's pictures, where another process can do it; the function waits for them."""
-    return drawing.asked(PICTURES, "pictures", result)
+    return drawing.asked(DRAWN_BY, "pictures", result)
 
 
 def _validations(result: Result) -> list[str]:
