@@ -189,3 +189,12 @@ def test_a_file_of_points_that_comes_later_can_be_chosen(folder: Path) -> None:
     made.refresh()
     made.choices.set("points_file", "later.csv")
     assert settled(made).latest is not None and made.latest.summary["length_mm"] == pytest.approx(25.4)
+
+
+def test_a_file_of_points_that_was_written_anew_is_read_anew(folder: Path) -> None:
+    made = filled(folder, "points")
+    (folder / "points.csv").write_text("x [mm], y [mm]\n0,0\n33,0\n")
+    with pytest.raises(InputError, match="not made yet; wait a moment"):
+        made.write()
+    settled(made).write()
+    assert "X33" in (folder / "points.ngc").read_text()

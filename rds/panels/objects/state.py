@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 PANEL = "objects"
 OF_ALL = ("feed", "safe", "spindle", "blend", "decimals")  # fields of every program
+_LOOK = 20  # ticks
 _OFFERED = re.compile(rf"({'|'.join(FORMS)})(-\d+)?\.ngc")
 _CALLED = {"safe height": "safe", "spindle speed": "spindle", "feed rate": "feed"}  # fields as messages name them
 
@@ -60,6 +61,8 @@ class Objects:
         self.refusal = self.wrong = ""
         self._made = MadePrograms(session, "form")
         self._makes = Latest(self._begin)
+        self._stamp: tuple[int, int] | None = None  # of the file of points, as it was read
+        self._ticks = 0
         self._offer()
         self.choices.watch(self._changed)
 
@@ -102,6 +105,7 @@ class Objects:
 
     def tick(self) -> bool:
         """Ten times a second: begin where something has changed; true when there is something new to show."""
+        self._follow_file()
         task = self._makes.tick()
         if task is None:
             return False
@@ -121,7 +125,26 @@ class Objects:
                 return called[words]
         return ""
 
+    def _follow_file(self) -> None:
+        """A file of points that was written anew is read anew; now and then look which there are."""
+        if self.form != "points":
+            return
+        self._ticks += 1
+        if self._ticks % _LOOK == 0:
+            self.refresh()
+        if self._stamp_now() != self._stamp:
+            self._stamp = self._stamp_now()
+            self._makes.again()
+
+    def _stamp_now(self) -> tuple[int, int] | None:
+        try:
+            found = (self.session.folder / str(self.choices["points_file"])).stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_size
+
     def _begin(self) -> Task[MadeObject]:
+        self._stamp = self._stamp_now()
         values, folder = self.choices.values(), self.session.folder
         return self.session.work("make an object", lambda task: made(values, folder))
 
@@ -130,6 +153,7 @@ class Objects:
 
         InputError where there is no path, or a file of that name that was not written from here.
         """
+        self._follow_file()
         if self.refusal or self.latest is None or self.going_on:
             raise InputError(self.refusal or "the path is not made yet; wait a moment")
         name = str(self.choices["program"])

@@ -27,7 +27,9 @@ class ObjectsView:
         self.verdict.add_class("rds-verdict")
         self.verdict.say("making …")
         self.notice = Notice()
-        self._views = {name: FieldView(choices, name) for name in choices.fields}
+        self._views = {
+            name: FieldView(choices, name, buttons=False if name == "points_file" else None) for name in choices.fields
+        }
         self._form = _group([])
         folded = widgets.Accordion(
             [_group([self._views[name] for name in OF_ALL if name != "feed"])],
@@ -77,8 +79,10 @@ class ObjectsView:
         for name, view in self._views.items():
             view.mark(objects.refusal if name == objects.wrong else "")
         if found is None or objects.refusal:
-            at_field = f"first mend what is refused: {self._views[objects.wrong].field.label}" if objects.wrong else ""
-            self.verdict.say(at_field or objects.refusal, "note" if objects.waits else "error")
+            said = objects.refusal
+            if objects.wrong in [*objects.names(), "feed"]:  # whose field is in sight, and says it
+                said = f"first mend what is refused: {self._views[objects.wrong].field.label}"
+            self.verdict.say(said, "note" if objects.waits else "error")
             self.figure.clear()
             return
         self.verdict.say(found.sentence, "good")
