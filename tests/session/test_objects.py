@@ -188,7 +188,8 @@ def test_a_file_of_points_that_comes_later_can_be_chosen(folder: Path) -> None:
     (folder / "later.csv").write_text("x_in,y_in\n0,0\n1,0\n")
     made.refresh()
     made.choices.set("points_file", "later.csv")
-    assert settled(made).latest is not None and made.latest.summary["length_mm"] == pytest.approx(25.4)
+    found = settled(made).latest
+    assert found is not None and found.summary["length_mm"] == pytest.approx(25.4)
 
 
 def test_a_file_of_points_that_was_written_anew_is_read_anew(folder: Path) -> None:
