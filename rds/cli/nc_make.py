@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
+from typer.models import ArgumentInfo, OptionInfo
 
-from rds.cli.common import Json, print_json, refusals, writes_files
+from rds.cli.common import Json, declared, print_json, refusals, writes_files
 from rds.cli.option_names import named_by_options
-
-if TYPE_CHECKING:
-    from rds.core.types import Segment
-    from rds.nc.paths.outlines import Outline
+from rds.core.quantities import Flag, Quantity
+from rds.nc.paths.numbers import BLEND, DECIMALS, HEIGHT, SPINDLE
+from rds.nc.paths.objects import DEPTH, FEED, OBJECTS, File, Made, numbers
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -32,30 +31,34 @@ def _feed(value: float) -> float:
     return value
 
 
-Feed = Annotated[float, typer.Option("--feed", "-f", callback=_feed, help="Feed rate along the path, mm/min.")]
-Centre = Annotated[str, typer.Option(help="Centre x,y in mm.")]
-Depth = Annotated[float, typer.Option(help="Depth below z = 0, mm.")]
+def _sentence(meaning: str) -> str:
+    return f"{meaning[0].upper()}{meaning[1:]}."
 
 
-@dataclass(frozen=True)
-class Made:
-    """A path, what it is in a few words, and what there is to say of it besides."""
+Feed = Annotated[float, typer.Option("--feed", "-f", callback=_feed, help=_sentence(FEED.described))]
 
-    segments: Sequence[Segment]
-    said: str
-    more: dict[str, Any] = field(default_factory=dict)
-    drawing: Outline | None = None
-    source: Path | None = None  # the file that it was read from
+
+def _option(name: str, hint: Any) -> Any:
+    """What typer is told of a parameter that has a declaration."""
+    if name == "feed":
+        return Feed
+    kind, said = get_args(hint)
+    if isinstance(said, OptionInfo | ArgumentInfo):
+        return hint
+    words = _sentence(said.described if isinstance(said, Quantity) else said.meaning)
+    if isinstance(said, File):
+        return Annotated[kind, typer.Argument(help=words)]
+    if isinstance(said, Flag):
+        return Annotated[kind, typer.Option(f"--{name}", help=words)]
+    return Annotated[kind, typer.Option(help=words)]
 
 
 def written(
     out: Annotated[Path, typer.Option("--out", "-o", help="The part program to write.")],
-    safe: Annotated[
-        float | None, typer.Option(help="z of rapid moves to and from the path, mm; without it the tool feeds there.")
-    ] = None,
-    spindle: Annotated[float | None, typer.Option(help="Spindle speed, rev/min, clockwise.")] = None,
-    blend: Annotated[float | None, typer.Option(help="Corners may be rounded by this much (G64 P), mm.")] = None,
-    decimals: Annotated[int, typer.Option(min=1, max=9, help="Decimals of coordinates, in mm.")] = 4,
+    safe: Annotated[float | None, declared(HEIGHT)] = None,
+    spindle: Annotated[float | None, declared(SPINDLE)] = None,
+    blend: Annotated[float | None, declared(BLEND, "G64 P")] = None,
+    decimals: Annotated[int, declared(DECIMALS)] = 4,
     plot: Annotated[Path | None, typer.Option(help="Also save a picture of the path (PNG).")] = None,
     json: Json = False,
     *,
@@ -76,12 +79,9 @@ def written(
         if made.source is not None and out.exists() and out.samefile(made.source):
             raise InputError("is the file to read from; write the part program to another one", str(out))
         keep_another(out, "rds nc make", "program of `rds nc make`")
-        title = f"rds nc make: {made.said}"
-        if made.more.get("deviation_mm"):
-            title += f"\ndeviation {made.more['deviation_mm']:.4f} mm"
         with named_by_options(options):
             text = part_program(
-                made.segments, title, safe_height=safe, spindle=spindle, blend=blend, decimals=decimals
+                made.segments, made.title, safe_height=safe, spindle=spindle, blend=blend, decimals=decimals
             ).encode()
         writers: dict[Path, Callable[[Any], None]] = {out: lambda stream: stream.write(text)}
         if plot is not None:
@@ -105,9 +105,8 @@ def maker(make: Callable[..., Made]) -> Callable[..., None]:
     """A command of `make`'s own options and those of `written`."""
     own = inspect.signature(make).parameters
     shared = {name: p for name, p in inspect.signature(written).parameters.items() if name not in _OURS}
-    hints = get_type_hints(make, include_extras=True) | get_type_hints(
-        written, {**globals(), "Made": Any}, include_extras=True
-    )
+    hints = {name: _option(name, get_type_hints(make, include_extras=True)[name]) for name in own}
+    hints |= get_type_hints(written, include_extras=True)
 
     options = {name.replace("_", "-") for name in (*own, *shared)}
 
@@ -122,111 +121,8 @@ def maker(make: Callable[..., Made]) -> Callable[..., None]:
     return app.command()(writes_files(command))
 
 
-@maker
-def line(
-    start: Annotated[str, typer.Option(help="Start x,y or x,y,z in mm (z is 0 unless given).")],
-    end: Annotated[str, typer.Option(help="End, likewise.")],
-    feed: Feed,
-) -> Made:
-    """A straight cut between two points in space, all axes starting and ending together."""
-    from rds.nc.paths.lines import line as make
-
-    return Made(make(_numbers(start, "--start"), _numbers(end, "--end"), feed / 60), f"line from {start} to {end} mm")
-
-
-@maker
-def quad(
-    feed: Feed,
-    corner: Annotated[
-        list[str] | None, typer.Option(help="A corner x,y or x,y,z in mm; four of them, in their order.")
-    ] = None,
-    start: Annotated[str | None, typer.Option(help="The first corner, where the sides are given by --move.")] = None,
-    move: Annotated[
-        list[str] | None,
-        typer.Option(help="A side: direction (degrees), length (mm), change in z (mm, 0 unless given); three of them."),
-    ] = None,
-) -> Made:
-    """A quadrilateral, closed: by four corners, or by one corner and three sides (the fourth leads back)."""
-    from rds.core.errors import InputError
-    from rds.nc.paths.lines import quadrilateral, quadrilateral_by_moves
-
-    if bool(corner) == bool(start is not None or move):
-        raise InputError("quad: give --corner four times, or --start and --move three times")
-    if corner:
-        corners = [_numbers(text, "--corner") for text in corner]
-        return Made(quadrilateral(corners, feed / 60), f"quadrilateral {' '.join(corner)} mm")
-    if start is None:
-        raise InputError("quad: --move needs a corner to begin at; give --start")
-    moves: Any = [_numbers(text, "--move") for text in move or []]
-    segments = quadrilateral_by_moves(_numbers(start, "--start"), moves, feed / 60)
-    return Made(segments, f"quadrilateral from {start} mm by {' '.join(move or [])} (degrees, mm, mm)")
-
-
-@maker
-def arc(
-    centre: Centre,
-    radius: Annotated[float, typer.Option(help="Radius, mm.")],
-    start_angle: Annotated[float, typer.Option(help="Angle from +X to the start, degrees.")],
-    sweep: Annotated[float, typer.Option(help="Degrees; positive counter-clockwise, 360 a circle, more for turns.")],
-    feed: Feed,
-    depth: Depth = 0.0,
-    end_depth: Annotated[float | None, typer.Option(help="Depth at the end, mm: the arc becomes a helix.")] = None,
-) -> Made:
-    """An arc, a circle or a helix by centre, radius, start angle and sweep."""
-    from rds.nc.paths.arcs import arc as make
-
-    middle = _numbers(centre, "--centre")
-    segments = make(middle, radius, start_angle, sweep, feed / 60, depth=depth, end_depth=end_depth)
-    helix = "" if end_depth is None else f" to {end_depth:g} mm"
-    said = f"arc about {centre} mm, radius {radius:g} mm, {sweep:g}° from {start_angle:g}°, depth {depth:g} mm{helix}"
-    return Made(segments, said)
-
-
-@maker
-def cone(
-    centre: Centre,
-    radius: Annotated[float, typer.Option(help="Radius of the circle at the bottom, mm.")],
-    height: Annotated[float, typer.Option(help="Depth of the bottom below z = 0, mm.")],
-    step_height: Annotated[float, typer.Option(help="Rise of one turn, mm.")],
-    step_width: Annotated[float, typer.Option(help="Narrowing of one turn, mm.")],
-    feed: Feed,
-    step_angle: Annotated[float | None, typer.Option(help="Degrees for each chord; 2 unless given.")] = None,
-    tolerance: Annotated[
-        float | None, typer.Option(help="Largest distance of a chord from the spiral, mm, instead of --step-angle.")
-    ] = None,
-) -> Made:
-    """A spiral cone: a circle at the bottom, then a spiral up and inwards to z = 0."""
-    from rds.nc.paths.cone import chord_angle, chord_error, spiral_cone
-
-    middle, options = _numbers(centre, "--centre"), {"step_angle": step_angle, "tolerance": tolerance}
-    segments = spiral_cone(middle, radius, height, step_height, step_width, feed / 60, **options)
-    error = chord_error(radius, step_width, chord_angle(radius, step_width, **options))
-    said = f"spiral cone about {centre} mm, radius {radius:g} mm, height {height:g} mm, "
-    said += f"step height {step_height:g} mm, step width {step_width:g} mm"
-    return Made(segments, said, {"deviation_mm": error, "tolerance_mm": tolerance})
-
-
-@maker
-def points(
-    file: Annotated[
-        Path, typer.Argument(help="Text with a point a line: x, y and perhaps z, and a header with units.")
-    ],
-    feed: Feed,
-    unit: Annotated[str | None, typer.Option(help="mm, cm, m, um or in, where the file does not say.")] = None,
-    depth: Annotated[float | None, typer.Option(help="Depth below z = 0 of points without z, mm.")] = None,
-    close: Annotated[bool, typer.Option("--close", help="Go back to the first point at the end.")] = False,
-    tolerance: Annotated[
-        float | None, typer.Option(help="Fit arcs and longer lines that keep within this distance, mm.")
-    ] = None,
-) -> Made:
-    """A path through the points of a file, in lines, or with --tolerance in arcs and lines."""
-    from rds.nc.paths.points import path_of_points, read_points
-
-    read = read_points(file, unit)
-    segments, deviation = path_of_points(read, feed / 60, depth=depth, closed=close, tolerance=tolerance)
-    more: dict[str, Any] = {"points": sum(map(len, read.pieces)), "repeated_points_left_out": read.repeated}
-    more |= {} if tolerance is None else {"deviation_mm": deviation, "tolerance_mm": tolerance}
-    return Made(segments, f"points of {file.name}", more, source=file)
+for _make in OBJECTS.values():
+    maker(_make)
 
 
 @maker
@@ -235,7 +131,7 @@ def outline(
     pixel: Annotated[float, typer.Option(help="Size of a pixel or character, mm.")],
     feed: Feed,
     at: Annotated[str, typer.Option(help="Place of the drawing's lower left corner, x,y in mm.")] = "0,0",
-    depth: Depth = 0.0,
+    depth: Annotated[float, DEPTH] = 0.0,
     passes: Annotated[int, typer.Option(min=1, help="Equal steps in which the depth is reached.")] = 1,
     trace: Annotated[
         str, typer.Option(help="contour (between the pixels) or blob (through their centres).")
@@ -272,7 +168,7 @@ def outline(
         specks = darkness.size // 1000 if photo else 0
     options: dict[str, Any] = {"method": trace, "holes": holes, "invert": invert, "arcs": arcs, "photo": photo}
     options |= {"level": _level(level, photo), "blur": (1.5 if photo else 0.0) if blur is None else blur}
-    options |= {"specks": specks, "tolerance": tolerance, "at": _numbers(at, "--at"), "depth": depth, "passes": passes}
+    options |= {"specks": specks, "tolerance": tolerance, "at": numbers(at, "at"), "depth": depth, "passes": passes}
     traced = make(darkness, pixel, feed / 60, name=str(file), **options)
     rows, columns = traced.darkness.shape
     said = f"outline of {file.name}, {columns} x {rows} pixels of {pixel:g} mm"
@@ -285,16 +181,7 @@ def _level(text: str | None, photo: bool) -> float | None:
     """The level as a number; None for the automatic one."""
     if text == "auto" or (text is None and photo):
         return None
-    return 0.5 if text is None else _numbers(text, "--level")[0]
-
-
-def _numbers(text: str, option: str) -> list[float]:
-    from rds.core.errors import InputError
-
-    try:
-        return [float(word) for word in text.split(",")]
-    except ValueError as error:
-        raise InputError(f"{option} {text!r} is not numbers with commas between them, as in 10,-2.5") from error
+    return 0.5 if text is None else numbers(text, "level")[0]
 
 
 def _count(number: int, noun: str) -> str:

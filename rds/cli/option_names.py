@@ -19,6 +19,7 @@ _PHRASES = (
     ("a larger step height", "a larger --step-height"),
     ("start and end are the same", "--start and --end are the same"),
     (r"unit (?='[^']*' is not known)", "--unit "),
+    (r"^(start|end|corner|move|centre|at|level) (?='.*' is not numbers)", r"--\1 "),
 )
 
 

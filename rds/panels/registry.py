@@ -18,6 +18,7 @@ PANELS = Registry(
         "interpolator": "rds.panels.interpolator.panel",
         "program": "rds.panels.program.panel",
         "drawing": "rds.panels.drawing.panel",
+        "objects": "rds.panels.objects.panel",
         "machine": "rds.panels.machine.panel",
         "jog": "rds.panels.jog.panel",
         "data": "rds.panels.data.panel",

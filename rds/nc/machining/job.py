@@ -15,7 +15,8 @@ from rds.core.toml_table import TomlTable
 from rds.core.types import Segment
 from rds.nc.language.tool_library import read_library
 from rds.nc.machining.operations import OPERATIONS, Cut, operate
-from rds.nc.paths.program import BLEND, HEIGHT, MoveWriter, comment
+from rds.nc.paths.numbers import BLEND, HEIGHT
+from rds.nc.paths.program import MoveWriter, comment
 from rds.nc.shapes.curves import Curve, Drawing
 from rds.nc.shapes.files import read_vector_drawing
 from rds.nc.shapes.lettering import text_drawing

@@ -16,6 +16,12 @@ NOT_NEGATIVE = Quantity("length", "mm", low=0.0)
 COORDINATE = Quantity("coordinate", "mm")
 ANGLE = Quantity("angle", "degrees")
 
+# What a program has besides its path.
+SPINDLE = Quantity("spindle speed, clockwise", "rev/min", above=0.0)
+BLEND = Quantity("how far blended corners may be off the path", "mm", above=0.0)
+HEIGHT = Quantity("z of rapid moves to and from the path; without it the tool feeds there", "mm")
+DECIMALS = Quantity("decimals of coordinates in mm", low=1, high=9, default=4, whole=True)
+
 
 def number(value: Any, name: str, owner: str, option: Quantity) -> float:
     """The value as a checked float; InputError says what it must be. Lengths end at a kilometre, as do angles at a

@@ -8,10 +8,9 @@ from math import dist, hypot, inf, pi
 
 from rds.core.errors import InputError
 from rds.core.geometry import sweep
-from rds.core.quantities import Quantity
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.nc.paths.measure import pieces
-from rds.nc.paths.numbers import FARTHEST, FEED_RATE, number
+from rds.nc.paths.numbers import BLEND, FARTHEST, FEED_RATE, HEIGHT, SPINDLE, number
 
 # An arc's end may be off its circle by either of these (LinuxCNC, interp_internal.hh and "G2, G3 Arc Move").
 ARC_TOLERANCE = 2 * 0.01 * 2**0.5  # mm
@@ -20,10 +19,6 @@ LEAST_RADIUS = 0.0013  # mm; LinuxCNC refuses arcs of less than 0.00005 inch
 DECIMALS = 4
 _COMMENT = 200  # characters; LinuxCNC's lines end at 255
 _ACTIVE = re.compile(r"(msg|debug|print|log|py|abort|probe)", re.IGNORECASE)  # comments that LinuxCNC acts on
-
-SPINDLE = Quantity("spindle speed, clockwise", "rev/min", above=0.0)
-BLEND = Quantity("how far blended corners may be off the path", "mm", above=0.0)
-HEIGHT = Quantity("safe height above z = 0", "mm")
 
 
 def part_program(

@@ -11,7 +11,7 @@ import numpy as np
 
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
-from rds.panels.program.state import program_choices
+from rds.panels.program.made import MadePrograms
 from rds.panels.program.text import check_name
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text
 from rds.panels.session.latest import Latest
@@ -175,7 +175,7 @@ class Drawing:
         self.latest: Traced | None = None
         self.refusal = ""
         self._fitting = False  # rows and columns follow the cells, and not the other way round
-        self._written: dict[Path, bytes] = {}
+        self._made = MadePrograms(session, "drawing")
         self._traces = Latest(self._begin)
         self.choices.watch(self._changed)
 
@@ -251,17 +251,7 @@ class Drawing:
         if self.refusal or self.latest is None or self.tracing:
             raise InputError(self.refusal or "the outline is not traced yet; wait a moment")
         name = str(self.choices["program"])
-        path, data = self.session.folder / name, self.latest.text.encode()
-        before = path.read_bytes() if path.is_file() else None
-        if before is not None and before not in (data, self._written.get(path)):
-            raise InputError(f"there is a {name} already, which is not of this drawing; choose another name")
-        draft = path.with_name(f".{name}.draft")
-        if draft.exists():
-            raise InputError(f"{name} has changes in the program panel that are not saved; choose another name")
-        write_whole(path, data)
-        self._written[path] = data
-        program = program_choices(self.session)
-        program.set("file", name)
+        self._made.write(name, self.latest.text)
         return name
 
 

@@ -36,7 +36,7 @@ class FieldView(widgets.VBox):
         self._buttons = buttons
         self._refusal = Html("")
         self._refusal.add_class("rds-refusal")
-        self._loading = False
+        self._loading = self._marked = False
         self._end = choices.watch(self._changed)
         self._disabled = disabled
         self._slider = Slider(self._slid) if slider else None
@@ -51,7 +51,12 @@ class FieldView(widgets.VBox):
     @property
     def refused(self) -> bool:
         """Whether what stands in it will not do."""
-        return bool(self._refusal.value)
+        return bool(self._refusal.value) and not self._marked
+
+    def mark(self, sentence: str) -> None:
+        """Say under the field what is wrong with its value beside those of others; empty: nothing is."""
+        if not self.refused:
+            self._refuse(sentence, marked=True)
 
     @property
     def disabled(self) -> bool:
@@ -122,7 +127,8 @@ class FieldView(widgets.VBox):
         except InputError as error:
             self._refuse(str(error))
 
-    def _refuse(self, sentence: str) -> None:
+    def _refuse(self, sentence: str, marked: bool = False) -> None:
+        self._marked = marked
         self._refusal.value = f'<span role="alert">✖ {escape(sentence)}</span>' if sentence else ""
         (self.add_class if sentence else self.remove_class)("rds-refused")
 
