@@ -148,6 +148,18 @@ def test_a_picture_is_taken_into_the_folder_and_traced(tmp_path: Path) -> None:
         made.take_picture("shape.txt", b"other")
 
 
+def test_a_picture_that_was_drawn_anew_is_traced_anew(tmp_path: Path) -> None:
+    (tmp_path / "part.txt").write_text(BLOCK)
+    made = drawing(tmp_path, source="picture", picture="part.txt")
+    assert made.latest is not None
+    before = made.latest.text
+    (tmp_path / "part.txt").write_text(BLOCK.replace("####", "###."))
+    with pytest.raises(InputError, match="not traced yet; wait a moment"):
+        made.write()
+    drawing_of(made).write()
+    assert made.latest.text == (tmp_path / "drawing.ngc").read_text() != before
+
+
 @pytest.mark.parametrize("name", ["x.exe", ".png", "../../x", "a\x00.png", ""])
 def test_a_file_that_is_no_picture_stays_out(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match="no picture"):

@@ -176,7 +176,7 @@ class Drawing:
         self.refusal = ""
         self._fitting = False  # rows and columns follow the cells, and not the other way round
         self._made = MadePrograms(session, "drawing")
-        self._traces = Latest(self._begin)
+        self._traces = Latest(self._begin, self._file)
         self.choices.watch(self._changed)
 
     def _changed(self, name: str) -> None:
@@ -238,6 +238,10 @@ class Drawing:
     def clear(self) -> None:
         """All cells empty."""
         self.choices.set("cells", "\n".join(["." * int(self.choices["columns"])] * int(self.choices["rows"])))
+
+    def _file(self) -> Path | None:
+        name = str(self.choices["picture"]) if self.choices["source"] == PICTURE else ""
+        return self.session.folder / name if name else None
 
     def _begin(self) -> Task[Traced]:
         values, folder = self.choices.values(), self.session.folder

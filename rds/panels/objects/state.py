@@ -60,8 +60,7 @@ class Objects:
         self.latest: MadeObject | None = None
         self.refusal = self.wrong = ""
         self._made = MadePrograms(session, "form")
-        self._makes = Latest(self._begin)
-        self._stamp: tuple[int, int] | None = None  # of the file of points, as it was read
+        self._makes = Latest(self._begin, self._file)
         self._ticks = 0
         self._offer()
         self.choices.watch(self._changed)
@@ -105,7 +104,9 @@ class Objects:
 
     def tick(self) -> bool:
         """Ten times a second: begin where something has changed; true when there is something new to show."""
-        self._follow_file()
+        self._ticks += 1
+        if self.form == "points" and self._ticks % _LOOK == 0:
+            self.refresh()
         task = self._makes.tick()
         if task is None:
             return False
@@ -125,26 +126,11 @@ class Objects:
                 return called[words]
         return ""
 
-    def _follow_file(self) -> None:
-        """A file of points that was written anew is read anew; now and then look which there are."""
-        if self.form != "points":
-            return
-        self._ticks += 1
-        if self._ticks % _LOOK == 0:
-            self.refresh()
-        if self._stamp_now() != self._stamp:
-            self._stamp = self._stamp_now()
-            self._makes.again()
-
-    def _stamp_now(self) -> tuple[int, int] | None:
-        try:
-            found = (self.session.folder / str(self.choices["points_file"])).stat()
-        except OSError:
-            return None
-        return found.st_mtime_ns, found.st_size
+    def _file(self) -> Path | None:
+        name = str(self.choices["points_file"]) if self.form == "points" else ""
+        return self.session.folder / name if name else None
 
     def _begin(self) -> Task[MadeObject]:
-        self._stamp = self._stamp_now()
         values, folder = self.choices.values(), self.session.folder
         return self.session.work("make an object", lambda task: made(values, folder))
 
@@ -153,7 +139,6 @@ class Objects:
 
         InputError where there is no path, or a file of that name that was not written from here.
         """
-        self._follow_file()
         if self.refusal or self.latest is None or self.going_on:
             raise InputError(self.refusal or "the path is not made yet; wait a moment")
         name = str(self.choices["program"])

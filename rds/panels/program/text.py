@@ -10,6 +10,7 @@ from pathlib import Path
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.nc.bundled import bundled
+from rds.panels.session.latest import stamp
 
 ENDINGS = (".ngc", ".nc", ".gcode", ".tap", ".cnc")
 LARGEST = 2 << 20  # bytes of a program that is edited here
@@ -52,7 +53,7 @@ class ProgramText:
         self._open()
 
     def _open(self) -> None:
-        self._stamp = _stamp(self.path)
+        self._stamp = stamp(self.path)
         saved, draft = _read(self.path), _read(self.draft)
         self._digest = _digest(saved)
         self._saved = saved
@@ -80,11 +81,11 @@ class ProgramText:
     @property
     def replaced(self) -> bool:
         """Whether somebody else has written the file since it was read or saved here."""
-        return _stamp(self.path) != self._stamp
+        return stamp(self.path) != self._stamp
 
     def accept(self) -> None:
         """Say no more that the file was replaced, as it is now."""
-        self._stamp = _stamp(self.path)
+        self._stamp = stamp(self.path)
 
     def edit(self, text: str) -> None:
         """Take the text, and keep it as a draft; InputError where it is too long or the draft cannot be written."""
@@ -106,7 +107,7 @@ class ProgramText:
                 "discard your changes to see the other's"
             )
         write_whole(self.path, _data(self.text))
-        self._saved, self._digest, self._stamp = self.text, _digest(self.text), _stamp(self.path)
+        self._saved, self._digest, self._stamp = self.text, _digest(self.text), stamp(self.path)
         self.draft.unlink(missing_ok=True)
 
     def save_as(self, name: str) -> ProgramText:
@@ -122,14 +123,6 @@ class ProgramText:
         """Give the draft up: the text is the file's, as it is on disk now."""
         self.draft.unlink(missing_ok=True)
         self._open()
-
-
-def _stamp(path: Path) -> tuple[int, int] | None:
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return found.st_mtime_ns, found.st_size
 
 
 def _data(text: str) -> bytes:
