@@ -23,6 +23,9 @@ from rds.bus.tools.mf4 import put_off_asammdf
 
 # Tests run side by side, and so do their many processes: numpy's threads would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Texts are compared without colours, which these ask for; typer reads them once, and also GITHUB_ACTIONS.
+os.environ.pop("FORCE_COLOR", None)
+os.environ["_TYPER_FORCE_DISABLE_TERMINAL"] = "1"
 put_off_asammdf()  # as our programs do: seconds of each worker
 # ... and of each process that a test starts; see there
 os.environ["PYTHONPATH"] = os.pathsep.join(

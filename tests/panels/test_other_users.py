@@ -58,7 +58,8 @@ def tcp_ports(app: App) -> list[int]:
     held = set()
     for process in processes(app):
         for descriptor in Path(f"/proc/{process}/fd").iterdir():
-            held.update(re.findall(r"^socket:\[(\d+)\]", os.readlink(descriptor)))
+            with contextlib.suppress(FileNotFoundError):  # closed since it was listed
+                held.update(re.findall(r"^socket:\[(\d+)\]", os.readlink(descriptor)))
     lines = [line.split() for name in ("tcp", "tcp6") for line in Path("/proc/net", name).read_text().splitlines()[1:]]
     return [int(line[1].rpartition(":")[2], 16) for line in lines if line[3] == "0A" and line[9] in held]
 
