@@ -78,9 +78,8 @@ def lsim(
 
 def _numbers(name: str, values: Any) -> np.ndarray:
     try:
-        if (
-            kind := np.asarray(values).dtype
-        ).kind in "cmM":  # numpy would drop what is imaginary, and count dates in ns
+        kind = np.asarray(values).dtype
+        if kind.kind in "cmM":  # numpy would drop what is imaginary, and count dates in ns
             raise TypeError(f"it has the type {kind}")
         return np.asarray(values, float)
     except (TypeError, ValueError) as error:

@@ -16,7 +16,8 @@ from typing import Any
 import can
 import numpy as np
 
-from rds.bus.modules.dialects import DEFAULT, is_served
+from rds.bus.hub.bus_settings import SERIAL
+from rds.bus.modules.dialects import DEFAULT, bus_interface, is_served
 from rds.bus.modules.drift import drifts
 from rds.bus.modules.rds import frames
 from rds.bus.modules.server_process import end_server, start_server
@@ -135,7 +136,7 @@ def measure_clocks(
     loaded = load_machine(machine)
     if len(loaded.axes) < 2:
         raise InputError(f"machine {loaded.name} has one axis; clocks that run apart take two", loaded.path)
-    if any(axis.module.get("motor") == "stepper" for axis in loaded.axes.values()):
+    if bus_interface(loaded, {}) == SERIAL:
         raise InputError(
             f"{loaded.name} has units on a serial line, which tell no clocks; what drift costs their motion, "
             "`rds nc run FILE --method B,B-free --option drift=X:50` says",
