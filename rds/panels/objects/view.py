@@ -10,7 +10,7 @@ from rds.core.errors import InputError
 from rds.panels.kit.button import button
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
-from rds.panels.kit.layout import row
+from rds.panels.kit.layout import columns, row
 from rds.panels.kit.notice import Notice
 from rds.panels.objects.state import OF_ALL, Objects
 
@@ -37,15 +37,11 @@ class ObjectsView:
             selected_index=None,
         )
         folded.add_class("rds-folded")
-        side = widgets.VBox([_group([self._views["object"]]), self._form, folded])
-        side.add_class("rds-side")
         tip = "Write the part program and open it in the program panel"
         top = row(self._views["program"], button("Make the program", tip, self.make, self.notice, primary=True))
         top.layout.align_items = "flex-end"
-        main = widgets.VBox([top, self.notice, self.verdict, self.figure])
-        main.add_class("rds-main")
-        self.widget = widgets.HBox([side, main])
-        self.widget.add_class("rds-columns")
+        side = [_group([self._views["object"]]), self._form, folded]
+        self.widget = columns(side, [top, self.notice, self.verdict, self.figure])
         choices.watch(self._chosen)
         self._arrange()
         shell.ticker.add(self._tick)
