@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -210,8 +211,8 @@ def bare(tmp_path_factory: pytest.TempPathFactory, copy: Path) -> Iterator[Path]
     run("uv", "venv", "-q", "--python", sys.executable, str(folder / "env"))
     python = folder / "env" / ("Scripts" if os.name == "nt" else "bin") / "python"
     site = Path(run(str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").stdout.strip())
-    for name, path in required().items():  # by links: the same files, and no index is asked
-        (site / name).symlink_to(path)
+    for name, path in required().items():  # as copies: no index is asked, and what is installed there stays there
+        (shutil.copytree if path.is_dir() else shutil.copy2)(path, site / name)
     options = ("--wheel", "--no-build-isolation", "--python", sys.executable)
     run("uv", "build", "-q", *options, str(copy), "-o", str(folder))
     install(python, str(next(folder.glob("*.whl"))))
@@ -226,6 +227,12 @@ def run(*command: str, code: int | None = 0, cwd: Path | None = None) -> subproc
 
 def install(python: Path, *what: str) -> None:
     run("uv", "pip", "install", "-q", "--no-deps", "--python", str(python), *what)
+
+
+def packages(python: Path) -> dict[str, str]:
+    """Version of each installed package."""
+    found = json.loads(run("uv", "pip", "list", "-q", "--format", "json", "--python", str(python)).stdout)
+    return {each["name"]: each["version"] for each in found}
 
 
 EXPERIMENT = """
@@ -293,6 +300,8 @@ def test_the_printed_remedy_works(origin: str, bare: Path, copy: Path, tmp_path:
     place = {"wheel": ".whl[motion]'", "folder": f"'{copy}[motion]'", "editable": f"-e '{copy}[motion]'"}[origin]
     command = said.strip().partition("install it with: ")[2]
     assert command.endswith(place)
+    before = packages(bare)
     subprocess.run(command, shell=True, check=True, capture_output=True, timeout=120, cwd=tmp_path)
     run(str(bare), "-c", MOVE, cwd=tmp_path)
+    assert {name: number for name, number in packages(bare).items() if before.get(name) != number}.keys() == {"ruckig"}
     run("uv", "pip", "uninstall", "-q", "--python", str(bare), "ruckig")
