@@ -90,3 +90,12 @@ def test_late_days_are_taken_off_for_the_next_assignment(tmp_path: Path) -> None
     after = listed(tmp_path).with_late_days({"ada": 2, "cy": 1})
     assert [each.late_days for each in after.members] == [1, None, 0]
     assert all(each.extension_days == 0.0 for each in after.members)
+
+
+def test_two_files_of_one_student_of_the_list_refuse_each_other_and_nobody_else(tmp_path: Path) -> None:
+    """One student can bring this about, by another's number or name; the class is graded all the same."""
+    handed_in = (row("cy"), row("somebody", source={"email": "cy@example.edu"}), row("zoe"))
+    rows = {each.student: each for each in by_group(Intake("files", handed_in), listed(tmp_path)).rows}
+    assert set(rows) == {"cy", "somebody", "zoe", "red"} and rows["zoe"].status is None
+    assert all(rows[name].status is Status.REFUSED for name in ("cy", "somebody"))
+    assert rows["cy"].reason.startswith("cy, somebody are one student of the class list, cy; keep one")

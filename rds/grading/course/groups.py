@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rds.core.errors import InputError
 from rds.grading.course.class_list import ClassList
 from rds.grading.grade import Status
 from rds.grading.intake import HandedIn, Intake
@@ -17,22 +16,21 @@ def by_group(intake: Intake, listed: ClassList) -> Intake:
     """The rows of `intake` as the class list has them.
 
     The files of a group's members become one row with the group's name: the last that was handed in. Where nobody says
-    which was the last, the row is refused, with the names. Students and groups of the list without a file are
-    *missing*. InputError where two students of the list would be one row's.
+    which was the last, the row is refused, with the names; so are rows that are one student of the list. Students and
+    groups of the list without a file are *missing*.
     """
     groups = listed.groups()
+    members = [listed.find(row.student, row.source) for row in intake.rows]
+    of_member: dict[str, list[str]] = {}
+    for row, member in zip(intake.rows, members, strict=True):
+        if member is not None:
+            of_member.setdefault(member.student, []).append(row.student)
     rows: list[HandedIn] = []
     of_group: dict[str, list[HandedIn]] = {name: [] for name in groups}
-    seen: dict[str, str] = {}
-    for row in intake.rows:
-        member = listed.find(row.student, row.source)
-        if member is not None and member.student in seen:
-            raise InputError(
-                f"{seen[member.student]!r} and {row.student!r} are both {member.student!r} of the class list; give "
-                "each student a line, or keep one of the submissions"
-            )
-        if member is not None:
-            seen[member.student] = row.student
+    for row, member in zip(intake.rows, members, strict=True):
+        if member is not None and len(who := of_member[member.student]) > 1:
+            reason = f"{', '.join(who)} are one student of the class list, {member.student}; keep one of the submissions"
+            row = replace(row, status=Status.REFUSED, reason=reason)
         name = row.student if row.student in groups else member.group if member is not None else ""
         if name:
             of_group[name].append(row)
@@ -42,7 +40,7 @@ def by_group(intake: Intake, listed: ClassList) -> Intake:
     rows += [
         HandedIn(each.student, status=Status.MISSING, reason=NOTHING, source=dict(each.source))
         for each in listed.members
-        if not each.group and each.student not in seen
+        if not each.group and each.student not in of_member
     ]
     return replace(intake, rows=tuple(sorted(rows, key=lambda row: row.student)))
 
