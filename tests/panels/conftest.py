@@ -24,6 +24,7 @@ PATIENCE = 60_000  # ms, on a busy computer
 SEEN = Path(tempfile.gettempdir()) / "rds-screenshots"  # of tests that fail
 KEPT = Path(os.environ["RDS_SCREENSHOTS"]) if "RDS_SCREENSHOTS" in os.environ else None  # of all tests
 FAILED = pytest.StashKey[bool]()
+PROGRAM_TEXT = "document.querySelector('.rds-editor').view.state.doc.toString()"  # the page has the lines in sight
 
 
 class App(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.panels.conftest import App
+from tests.panels.conftest import PROGRAM_TEXT, App
 
 GOOD, BAD = ".rds-verdict .rds-notice-good", ".rds-verdict .rds-notice-error"
 LEFT, TOP = 30, 18  # px from the canvas's corner to the first cell
@@ -46,7 +46,7 @@ def test_cells_are_drawn_traced_and_made_into_a_program(open_page: Callable[...,
     page.click('button:text-is("Make the program")')
     page.wait_for_selector('.rds-title h1:text-is("Program")')
     page.wait_for_selector(f'{GOOD}:has-text("the machine can run it")')
-    assert "outline of your drawing" in page.input_value(".rds-editor textarea")
+    assert "outline of your drawing" in page.evaluate(PROGRAM_TEXT)
     assert "G1" in (app.folder / "drawing.ngc").read_text()
 
 

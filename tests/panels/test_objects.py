@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.panels.conftest import App
+from tests.panels.conftest import PROGRAM_TEXT, App
 
 GOOD, BAD = ".rds-verdict .rds-notice-good:visible", ".rds-verdict .rds-notice-error:visible"
 
@@ -35,5 +35,5 @@ def test_an_arc_is_filled_in_refused_at_its_field_and_made_into_a_program(
     page.click('button:visible:text-is("Make the program")')
     page.wait_for_selector('.rds-title h1:text-is("Program")')
     page.wait_for_selector(f'{GOOD}:has-text("the machine can run it")')
-    assert "rds nc make: arc about 20,20 mm" in page.input_value(".rds-editor textarea")
+    assert "rds nc make: arc about 20,20 mm" in page.evaluate(PROGRAM_TEXT)
     assert "G2 " in (app.folder / name).read_text()

@@ -14,14 +14,16 @@ import pytest
 from rds.machines import load_machine
 from rds.modes.loop.execution import State
 from rds.nc.active import Modes
+from rds.nc.language.blocks import G_GROUPS, M_GROUPS
+from rds.nc.language.expressions import FUNCTION
+from rds.nc.language.owords import KIND
 from rds.nc.run.run import Status
 from rds.panels.program.status import status_html
-from tests.panels.conftest import App
+from rds.panels.program.words import words
+from tests.panels.conftest import PROGRAM_TEXT, App
 
-EDITOR = ".rds-editor textarea"
-SELECTED = (
-    "(({value, selectionStart, selectionEnd}) => value.slice(selectionStart, selectionEnd))(document.activeElement)"
-)
+EDITOR = ".rds-editor .cm-content"
+SELECTED = "getSelection().toString()"
 SAVED = 180_000  # ms until the pictures of a report are drawn, on a busy computer
 SCENE = "document.querySelector('.rds-scene').dataset"
 VALID = '.rds-verdict .rds-notice-good:has-text("the machine can run it")'
@@ -80,6 +82,36 @@ def test_a_fault_is_marked_at_its_word_and_the_mark_goes_when_it_is_mended(open_
     page.wait_for_function("!document.querySelector('.rds-editor-error, .rds-editor-list button')")
 
 
+def test_each_word_of_the_interpreter_has_its_meaning() -> None:
+    known = {f"G{code / 10:g}" for code in G_GROUPS} | {f"M{code}" for code in (*M_GROUPS, 98)}
+    assert {word["label"] for word in words() if word["kind"] == "code"} == known
+    assert {word["label"] for word in words() if word["kind"] == "o"} == set(KIND.pattern.split("|"))
+    assert {word["label"].lower() for word in words() if word["kind"] == "function"} == set(FUNCTION.pattern.split("|"))
+
+
+def test_words_are_offered_and_say_what_they_mean(open_page: Callable[..., Any]) -> None:
+    page = opened(open_page)
+    write(page, lines("(G2 in a remark)", "G2 X10 Y0 I5 J0 F300"))
+    page.hover('.cm-line:has-text("G2 X10") .rds-editor-code')
+    page.wait_for_selector('.rds-editor-meaning:has-text("G2 arc clockwise")')
+    page.click('.rds-editor-code:text-is("M2")')
+    page.keyboard.press("Home")
+    page.keyboard.type("G8")
+    page.wait_for_selector('.cm-completionLabel:has-text("G83")')
+    page.keyboard.press("Enter")  # ends the line, whatever is offered
+    page.keyboard.type("g83")
+    page.wait_for_selector('.cm-completionDetail:has-text("comes out after each Q")')
+    page.wait_for_timeout(200)  # keys that come as soon as words are offered are not for them
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Enter")
+    page.wait_for_function(f"{PROGRAM_TEXT}.endsWith('G8\\nG83M2\\n')")
+    page.keyboard.press("Control+f")
+    page.keyboard.type("remark")
+    page.keyboard.press("Enter")
+    page.wait_for_selector('.cm-searchMatch-selected:has-text("remark")')
+    page.wait_for_selector('.rds-editor-says:has-text("G83")')  # what was written is checked
+
+
 def test_what_leaves_the_travel_is_crossed_in_the_preview_in_the_dark_too(open_page: Callable[..., Any]) -> None:
     page = opened(open_page)
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
@@ -102,7 +134,7 @@ def test_a_text_that_was_not_saved_is_there_after_a_reload(open_page: Callable[.
     page.wait_for_selector(VALID)
     page.wait_for_timeout(500)
     again = open_page("Program")
-    again.wait_for_function("document.querySelector('.rds-editor textarea').value.includes('unsaved words')")
+    again.wait_for_function(f"{PROGRAM_TEXT}.includes('unsaved words')")
     again.fill(".rds-program-name input", "kept.ngc")
     again.press(".rds-program-name input", "Tab")
     again.click('button:text-is("Save as")')

@@ -1,4 +1,4 @@
-"""The editor of code: CodeMirror 6 (MIT licence, in `static/`) in an anywidget, with faults shown below their lines."""
+"""The editor of code: CodeMirror in an anywidget, with faults shown below their lines."""
 
 from __future__ import annotations
 
@@ -12,14 +12,9 @@ import traitlets
 
 from rds.panels.code.completions import Word
 from rds.panels.equipment.build import Mark
+from rds.panels.kit.codemirror import module
 
 _STATIC = Path(__file__).parent / "static"
-
-
-@cache
-def _module() -> str:
-    library = (_STATIC / "codemirror.min.js").read_text(encoding="utf-8")
-    return library + "\n" + (_STATIC / "code.js").read_text(encoding="utf-8")
 
 
 @cache
@@ -42,7 +37,7 @@ class CodeEditor(anywidget.AnyWidget):
     words: Any = traitlets.List([]).tag(sync=True)
 
     def __init__(self, on_run: Callable[[], Any], on_drop: Callable[[str, bytes], Any], **options: Any):
-        super().__init__(_esm=_module(), _css=_style(), **options)
+        super().__init__(_esm=module(_STATIC / "code.js"), _css=_style(), **options)
         self.add_class("rds-code-widget")
         self._on_run, self._on_drop = on_run, on_drop
         self.on_msg(self._asked)

@@ -1,4 +1,4 @@
-"""The editor of part programs: a text with line numbers, marks at words with their messages, and the line that runs."""
+"""The editor of part programs, over CodeMirror: marks at words, what these mean, and the line that runs."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from typing import Any
 import anywidget
 import traitlets
 
+from rds.panels.kit.codemirror import module
 from rds.panels.program.check import Mark
 
 _STATIC = Path(__file__).parent / "static"
 
 
 @cache
-def _static(ending: str) -> str:
-    return (_STATIC / f"editor.{ending}").read_text(encoding="utf-8")
+def _style() -> str:
+    return (_STATIC / "editor.css").read_text(encoding="utf-8")
 
 
 class Editor(anywidget.AnyWidget):
@@ -32,9 +33,10 @@ class Editor(anywidget.AnyWidget):
     caret = traitlets.Int(1).tag(sync=True)  # the line that the cursor is in
     locked = traitlets.Bool(False).tag(sync=True)
     height = traitlets.Int(380).tag(sync=True)  # px
+    words: Any = traitlets.List([]).tag(sync=True)  # what is offered, and said of a word under the mouse
 
     def __init__(self, on_save: Callable[[], None], **options: Any):
-        super().__init__(_esm=_static("js"), _css=_static("css"), **options)
+        super().__init__(_esm=module(_STATIC / "editor.js"), _css=_style(), **options)
         self.add_class("rds-editor-widget")
         self._on_save = on_save
         self.on_msg(self._asked)

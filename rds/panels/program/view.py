@@ -33,6 +33,7 @@ from rds.panels.program.status import at_the_end, status_html
 from rds.panels.program.step_view import StepView
 from rds.panels.program.stock import drawn
 from rds.panels.program.tool_view import ToolView
+from rds.panels.program.words import words
 from rds.panels.scene.scene import MachineScene
 from rds.results import Result
 
@@ -51,7 +52,7 @@ class ProgramView:
         self._traced = self._shown = False
         self._uncut: ProgramWork | None = None  # a run that is over, until it is known what its program cuts
         self._ran: str | None = None  # the text whose run, or result, is shown
-        self.editor = Editor(lambda: self.files.save())
+        self.editor = Editor(lambda: self.files.save(), words=list(words()))
         self.editor.text = self.program.text.text
         self.editor.observe(self._typed, "text")
         self.files = ProgramFiles(self.program, self.notice, self._opened)

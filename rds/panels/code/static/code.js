@@ -71,9 +71,9 @@ function render({ model, el }) {
   const extensions = [
     CM.lineNumbers(), CM.highlightActiveLineGutter(), CM.highlightSpecialChars(), CM.history(), CM.drawSelection(),
     CM.indentOnInput(), CM.EditorView.lineWrapping, CM.indentUnit.of("    "), CM.bracketMatching(), CM.closeBrackets(), CM.highlightActiveLine(),
-    CM.syntaxHighlighting(look), CM.EditorState.tabSize.of(4), marked, language,
+    CM.syntaxHighlighting(look), CM.EditorState.tabSize.of(4), marked, language, CM.search({ top: true }),
     CM.autocompletion({ override: [complete, CM.localCompletionSource, CM.globalCompletion], icons: false }),
-    CM.keymap.of([{ key: "Mod-Enter", run }, ...CM.closeBracketsKeymap, ...CM.completionKeymap, ...CM.defaultKeymap,
+    CM.keymap.of([{ key: "Mod-Enter", run }, ...CM.closeBracketsKeymap, ...CM.searchKeymap, ...CM.completionKeymap, ...CM.defaultKeymap,
       ...CM.historyKeymap, CM.indentWithTab]),
     CM.EditorView.contentAttributes.of({ "aria-label": `${model.get("label")}; Escape, then Tab leaves the editor`,
       autocapitalize: "off", autocorrect: "off", spellcheck: "false" }),

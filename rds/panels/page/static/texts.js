@@ -2,7 +2,7 @@
 // the left; {} in it stands for whatever is there, {t} for a text that is exchanged in its turn. What somebody wrote
 // (code, files, programs) is left alone, and what is not in the table stays.
 
-const APART = "textarea, pre, code, script, style, .cm-editor, .rds-editor-over, .rds-guide iframe, .rds-strip-clock b";
+const APART = "textarea, pre, code, script, style, .cm-editor, .rds-guide iframe, .rds-strip-clock b";
 const NAMES = ["title", "aria-label", "placeholder"];
 const MOST_KNOWN = 5000;
 

@@ -1,153 +1,227 @@
-// A text editor for part programs: line numbers, marks at their words with the message behind the line, the line that
-// runs. A textarea does the editing; what is drawn over it are only the lines in sight, so that long programs stay fast.
+// The editor of part programs, over CodeMirror (which stands above this in the same module, as `CM`): marks at their
+// words with the message behind the line and below the text, the line that runs, and what each word means.
 
 const QUIET_MS = 250; // after the last key, before the text is sent
+const SHOWN = 50; // messages below the text
+const SIGNS = { error: "✖", warning: "⚠", running: "▶" };
+
+const language = CM.StreamLanguage.define({
+  token(stream) {
+    if (stream.match(/^\(.*?(\)|$)/) || stream.match(/^;.*/)) return "comment";
+    if (stream.match(/^o\s*(<[^>]*>|\d+)\s*[a-z]*/i)) return "keyword";
+    if (stream.match(/^#\s*(<[^>]*>|\d+)/)) return "variableName";
+    if (stream.match(/^[gm]\s*[\d.]+/i)) return "keyword";
+    if (stream.match(/^[-+]?[\d.]+/)) return "number";
+    stream.next();
+    return null;
+  },
+});
+const look = CM.HighlightStyle.define([
+  { tag: CM.tags.keyword, class: "rds-editor-code" },
+  { tag: CM.tags.variableName, class: "rds-editor-parameter" },
+  { tag: CM.tags.comment, class: "rds-editor-comment" },
+]);
+
+class Says extends CM.WidgetType {
+  constructor(text, kind) { super(); this.text = text; this.kind = kind; }
+  eq(other) { return other.text === this.text && other.kind === this.kind; }
+  toDOM() {
+    const made = document.createElement("span");
+    made.className = `rds-editor-says rds-editor-${this.kind}`;
+    made.setAttribute("aria-hidden", "true"); // it is said below the text, too
+    made.textContent = this.text;
+    return made;
+  }
+}
+
+class Numbered extends CM.GutterMarker {
+  constructor(text, kind) { super(); this.text = text; this.elementClass = `rds-editor-number-${kind}`; }
+  eq(other) { return other.text === this.text && other.elementClass === this.elementClass; }
+  toDOM() { return document.createTextNode(this.text); }
+}
+
+// What lies on the lines: decorations that move with the text, the kind of each marked line, and the line that runs.
+const setMarks = CM.StateEffect.define(), setRunning = CM.StateEffect.define();
+const marked = CM.StateField.define({
+  create: () => ({ shown: CM.Decoration.none, kinds: new Map(), running: 0 }),
+  update(found, change) {
+    let { shown, kinds, running } = found;
+    shown = shown.map(change.changes);
+    for (const effect of change.effects) {
+      if (effect.is(setRunning)) running = effect.value;
+      if (effect.is(setMarks)) [shown, kinds] = drawn(change.state.doc, effect.value);
+    }
+    return { shown, kinds, running };
+  },
+  provide: (field) => [
+    CM.EditorView.decorations.from(field, (found) => found.shown),
+    CM.EditorView.decorations.compute([field, "doc"], (state) => {
+      const { running } = state.field(field), { doc } = state;
+      if (running < 1 || running > doc.lines) return CM.Decoration.none;
+      return CM.Decoration.set([CM.Decoration.line({ class: "rds-editor-running" }).range(doc.line(running).from)]);
+    }),
+    CM.lineNumberMarkers.compute([field, "doc"], (state) => {
+      const { kinds, running } = state.field(field), { doc } = state, signs = new Map(kinds);
+      if (running) signs.set(running, "running");
+      const there = [...signs].filter(([number]) => number >= 1 && number <= doc.lines).sort(([a], [b]) => a - b);
+      return CM.RangeSet.of(there.map(([number, kind]) => new Numbered(`${SIGNS[kind]} ${number}`, kind).range(doc.line(number).from)));
+    }),
+  ],
+});
+
+function drawn(doc, marks) {
+  const ranges = [], kinds = new Map(), said = new Map();
+  for (const { line: number, column, length, text, kind } of marks) {
+    if (number < 1 || number > doc.lines) continue; // of the whole program, or of a line that is gone
+    const line = doc.line(number), from = Math.min(line.from + Math.max(column - 1, 0), line.to);
+    const to = column && length ? Math.min(from + length, line.to) : line.to;
+    const attributes = { "data-word": column ? doc.sliceString(from, to) : "" };
+    if (to > from) ranges.push(CM.Decoration.mark({ class: `rds-editor-word rds-editor-${kind}`, attributes }).range(from, to));
+    if (kinds.get(number) !== "error") kinds.set(number, kind);
+    said.set(number, [...(said.get(number) || []), text]);
+  }
+  for (const [number, texts] of said) {
+    ranges.push(CM.Decoration.widget({ widget: new Says(texts.join("  ·  "), kinds.get(number)), side: 1 }).range(doc.line(number).to));
+  }
+  return [CM.Decoration.set(ranges, true), kinds];
+}
+
+// What stands at `at` of a line: "G2", "X", "sub", "SIN", or nothing in a comment.
+function wordAt(text, at) {
+  const plain = text.replace(/\([^)]*\)?|;.*/g, (comment) => " ".repeat(comment.length));
+  const words = /(o\s*(?:<[^>]*>|\d+)\s*)([a-z]+)|#\s*(?:<[^>]*>|\d+)|([a-z]{2,})(?=\s*\[)|([gm])\s*(\d+(?:\.\d+)?)|([a-z])/gi;
+  for (const found of plain.matchAll(words)) {
+    const [whole, o, keyword, name, letter, number, other] = found, from = found.index + (o ? o.length : 0);
+    const value = /^\s*[-+]?[\d.]*/.exec(plain.slice(found.index + whole.length))[0];
+    const to = found.index + whole.length + (other ? value.trimEnd().length : 0);
+    if (at < from || at > to) continue;
+    const said = keyword ? keyword.toLowerCase() : name ? name.toUpperCase() : letter ? letter.toUpperCase() + Number(number) : other;
+    return said ? { said: other ? said.toUpperCase() : said, from, to } : null;
+  }
+  return null;
+}
+
+function completions(words) {
+  const of = (kind) => words.filter((word) => word.kind === kind).map(({ label, info }, n) => ({ label, detail: info, boost: -n / 10 }));
+  const [codes, keywords, functions] = ["code", "o", "function"].map(of);
+  return (context) => {
+    const line = context.state.doc.lineAt(context.pos), before = line.text.slice(0, context.pos - line.from);
+    if (/;|\([^)]*$/.test(before)) return null; // in a comment
+    const word = /(?:^|[^a-z#<])([gm][\d.]*)$/i.exec(before), after = /^\s*o\s*(?:<[^>]*>|\d+)\s*([a-z]*)$/i.exec(before);
+    if (after) return { from: context.pos - after[1].length, options: keywords, validFor: /^[a-z]*$/i };
+    const called = /\[[^\]]*?([a-z]+)$/i.exec(before);
+    if (called) return { from: context.pos - called[1].length, options: functions, validFor: /^[a-z]*$/i };
+    if (word) return { from: context.pos - word[1].length, options: codes, validFor: /^[gm][\d.]*$/i };
+    return context.explicit && /(^|\s)$/.test(before) ? { from: context.pos, options: codes, validFor: /^[gm][\d.]*$/i } : null;
+  };
+}
 
 function render({ model, el }) {
   const box = document.createElement("div");
   box.className = "rds-editor";
   box.style.setProperty("--rds-editor-height", `${model.get("height")}px`);
-  const gutter = document.createElement("div");
-  gutter.className = "rds-editor-gutter";
-  gutter.setAttribute("aria-hidden", "true");
-  const place = document.createElement("div");
-  place.className = "rds-editor-place";
-  const over = document.createElement("div");
-  over.className = "rds-editor-over";
-  over.setAttribute("aria-hidden", "true");
-  const area = document.createElement("textarea");
-  Object.assign(area, { spellcheck: false, wrap: "off", value: model.get("text") });
-  area.setAttribute("aria-label", model.get("label"));
-  area.setAttribute("autocapitalize", "off");
-  area.setAttribute("autocomplete", "off");
-  place.append(over, area);
-  box.append(gutter, place);
   const list = document.createElement("div");
   list.className = "rds-editor-list";
   list.setAttribute("role", "status");
   el.append(box, list);
 
-  let timer = 0, lines = area.value.split("\n"), frame = 0;
-  const metrics = () => {
-    const style = getComputedStyle(area);
-    const canvas = metrics.canvas || (metrics.canvas = document.createElement("canvas").getContext("2d"));
-    canvas.font = `${style.fontSize} ${style.fontFamily}`;
-    return { row: parseFloat(style.lineHeight), char: canvas.measureText("0".repeat(50)).width / 50,
-             pad: parseFloat(style.paddingLeft), top: parseFloat(style.paddingTop) };
-  };
-  // tabs are drawn as wide as the textarea draws them
-  const across = (text) => { let n = 0; for (const c of text) n = c === "\t" ? n + 8 - (n % 8) : n + 1; return n; };
-  const piece = (kind, left, top, width, height, text) => {
-    const made = document.createElement("div");
-    made.className = kind;
-    made.style.cssText = `left:${left}px;top:${top}px;height:${height}px;` + (width === null ? "" : `width:${width}px`);
-    if (text) made.textContent = text;
-    return made;
-  };
-
-  function draw() {
-    frame = 0;
-    if (!area.clientHeight) return;
-    const { row, char, pad, top } = metrics();
-    const first = Math.max(0, Math.floor((area.scrollTop - top) / row)), last = first + Math.ceil(area.clientHeight / row) + 1;
-    const at = new Map();
-    for (const mark of model.get("marks")) if (mark.line > first && mark.line <= last + 1) at.set(mark.line, [...(at.get(mark.line) || []), mark]);
-    const running = model.get("running"), numbers = [], drawn = [];
-    for (let n = first + 1; n <= Math.min(last + 1, lines.length); n++) {
-      const y = top + (n - 1) * row - area.scrollTop, marks = at.get(n) || [];
-      const bad = marks.some((mark) => mark.kind === "error");
-      const number = piece("rds-editor-number", 0, y, null, row, `${n === running ? "▶ " : bad ? "✖ " : marks.length ? "⚠ " : ""}${n}`);
-      if (marks.length) number.classList.add(bad ? "rds-editor-bad" : "rds-editor-warned");
-      if (n === running) number.classList.add("rds-editor-now");
-      numbers.push(number);
-      if (n === running) drawn.push(piece("rds-editor-running", 0, y, area.clientWidth, row));
-      if (!marks.length) continue;
-      const text = lines[n - 1];
-      for (const mark of marks) {
-        const from = mark.column ? across(text.slice(0, mark.column - 1)) : 0;
-        const wide = mark.column && mark.length ? mark.length : Math.max(across(text), 1) - from;
-        const word = piece(`rds-editor-word rds-editor-${mark.kind}`, pad + from * char - area.scrollLeft, y, Math.max(wide, 1) * char, row);
-        word.dataset.word = mark.column ? text.slice(mark.column - 1, mark.column - 1 + mark.length) : "";
-        drawn.push(word);
+  let timer = 0;
+  const words = model.get("words"), meanings = new Map(words.map(({ label, info }) => [label, info]));
+  const locked = new CM.Compartment(), lock = () => CM.EditorState.readOnly.of(model.get("locked"));
+  const hover = CM.hoverTooltip((view, at) => {
+    const line = view.state.doc.lineAt(at), word = wordAt(line.text, at - line.from), info = word && meanings.get(word.said);
+    if (!info) return null;
+    const create = () => {
+      const dom = document.createElement("div");
+      dom.className = "rds-editor-meaning";
+      const name = document.createElement("b");
+      name.textContent = word.said;
+      dom.append(name, ` ${info}`);
+      return { dom };
+    };
+    return { pos: line.from + word.from, end: line.from + word.to, above: true, create };
+  });
+  const save = (view) => { send(); model.send({ kind: "save", text: view.state.doc.toString() }); return true; };
+  const extensions = [
+    CM.lineNumbers(), CM.highlightSpecialChars(), CM.history(), CM.drawSelection(), CM.highlightActiveLine(),
+    CM.EditorState.tabSize.of(8), CM.syntaxHighlighting(look), language, marked, CM.search({ top: true }),
+    words.length ? [hover, CM.autocompletion({ override: [completions(words)], icons: false, selectOnOpen: false })] : [],
+    // Enter ends the line: what is offered is taken once an arrow key has chosen it
+    CM.keymap.of([{ key: "Mod-s", run: save, preventDefault: true }, ...CM.searchKeymap, ...CM.completionKeymap, ...CM.defaultKeymap, ...CM.historyKeymap]),
+    CM.EditorView.contentAttributes.of({ "aria-label": model.get("label"), autocapitalize: "off", autocorrect: "off", spellcheck: "false" }),
+    CM.EditorView.updateListener.of((update) => {
+      if (update.docChanged && !update.transactions.some((each) => each.annotation(CM.Transaction.remote))) {
+        clearTimeout(timer);
+        timer = setTimeout(send, QUIET_MS);
       }
-      const says = marks.map((mark) => mark.text).join("  ·  ");
-      drawn.push(piece(`rds-editor-says rds-editor-${bad ? "error" : "warning"}`, pad + (across(text) + 2) * char - area.scrollLeft, y, null, row, says));
-    }
-    gutter.replaceChildren(...numbers);
-    over.replaceChildren(...drawn);
-    box.dataset.running = running;
-  }
-  const redraw = () => { frame = frame || requestAnimationFrame(draw); };
-
-  function tell() {
-    const marks = model.get("marks"), shown = marks.slice(0, 50).map((mark) => {
-      const button = document.createElement("button");
-      button.type = "button";
-      button.className = `rds-editor-${mark.kind}`;
-      button.textContent = `${mark.kind === "error" ? "✖" : "⚠"} ${mark.line ? `line ${mark.line}: ` : ""}${mark.text}`;
-      button.title = "Go there";
-      button.onclick = () => go(mark.line, mark.column, mark.length);
-      return button;
-    });
-    list.replaceChildren(...shown);
-    if (marks.length > shown.length) list.append(`and ${marks.length - shown.length} more`);
-    area.setAttribute("aria-invalid", String(marks.some((mark) => mark.kind === "error")));
-  }
-
-  function go(line, column, length) {
-    if (!line) return;
-    const before = lines.slice(0, line - 1).reduce((sum, text) => sum + text.length + 1, 0);
-    const from = before + Math.max(column - 1, 0);
-    area.focus();
-    area.setSelectionRange(from, column ? from + length : before + (lines[line - 1] || "").length);
-    show(line);
-  }
-  function show(line) {
-    const { row, top } = metrics(), y = top + (line - 1) * row;
-    if (y < area.scrollTop + row || y > area.scrollTop + area.clientHeight - 2 * row) area.scrollTop = y - area.clientHeight / 2;
-    redraw();
-  }
+      if (update.selectionSet || update.docChanged) {
+        const caret = update.state.doc.lineAt(update.state.selection.main.head).number;
+        if (caret !== model.get("caret")) { model.set("caret", caret); model.save_changes(); }
+      }
+    }),
+    CM.EditorView.domEventHandlers({ blur: () => send() }),
+    locked.of(lock()),
+  ];
+  const fresh = () => CM.EditorState.create({ doc: model.get("text"), extensions });
+  const view = new CM.EditorView({ state: fresh(), parent: box });
+  box.view = view; // for whoever asks the page for the whole text, of which only the lines in sight are there
 
   function send() {
     clearTimeout(timer);
     timer = 0;
-    if (model.get("text") !== area.value) { model.set("text", area.value); model.save_changes(); }
+    const text = view.state.doc.toString();
+    if (model.get("text") !== text) { model.set("text", text); model.save_changes(); }
   }
-  area.addEventListener("input", () => {
-    lines = area.value.split("\n");
-    clearTimeout(timer);
-    timer = setTimeout(send, QUIET_MS);
-    redraw();
-  });
-  const caret = () => {
-    const line = area.value.slice(0, area.selectionStart).split("\n").length;
-    if (line !== model.get("caret")) { model.set("caret", line); model.save_changes(); }
-  };
-  for (const each of ["keyup", "click"]) area.addEventListener(each, caret);
-  area.addEventListener("blur", send);
-  area.addEventListener("scroll", redraw);
-  area.addEventListener("keydown", (event) => {
-    event.stopPropagation(); // JupyterLab has shortcuts of its own
-    if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "s") { event.preventDefault(); send(); model.send({ kind: "save", text: area.value }); }
-  });
+  const tell = (...effects) => view.dispatch({ effects, annotations: CM.Transaction.remote.of(true) });
+
+  function mark() {
+    const marks = model.get("marks"), shown = marks.slice(0, SHOWN).map((each) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = `rds-editor-${each.kind}`;
+      button.textContent = `${each.kind === "error" ? "✖" : "⚠"} ${each.line ? `line ${each.line}: ` : ""}${each.text}`;
+      button.title = "Go there";
+      button.onclick = () => go(each.line, each.column, each.length);
+      return button;
+    });
+    list.replaceChildren(...shown);
+    if (marks.length > shown.length) list.append(`and ${marks.length - shown.length} more`);
+    view.contentDOM.setAttribute("aria-invalid", String(marks.some((each) => each.kind === "error")));
+    tell(setMarks.of(marks));
+  }
+  function go(number, column, length) {
+    if (number < 1 || number > view.state.doc.lines) return;
+    const line = view.state.doc.line(number), from = Math.min(line.from + Math.max(column - 1, 0), line.to);
+    const to = column ? Math.min(from + length, line.to) : line.to;
+    view.dispatch({ selection: { anchor: from, head: to }, effects: CM.EditorView.scrollIntoView(from, { y: "center" }) });
+    view.focus();
+  }
+  function run() {
+    const number = model.get("running"), there = number >= 1 && number <= view.state.doc.lines;
+    box.dataset.running = number;
+    tell(setRunning.of(number), ...(there ? [CM.EditorView.scrollIntoView(view.state.doc.line(number).from, { y: "nearest", yMargin: 38 })] : []));
+  }
+  function shut() {
+    tell(locked.reconfigure(lock()));
+    box.classList.toggle("rds-editor-locked", model.get("locked"));
+  }
+
+  box.addEventListener("keydown", (event) => event.stopPropagation()); // JupyterLab, and the page, have keys of their own
   model.on("change:text", () => {
-    if (timer || model.get("text") === area.value) return; // what is being typed counts
-    area.value = model.get("text");
-    lines = area.value.split("\n");
-    area.scrollTop = 0;
-    redraw();
+    if (timer || model.get("text") === view.state.doc.toString()) return; // what is being typed counts
+    view.setState(fresh()); // another program: nobody undoes it into the one before
+    mark();
+    run();
+    shut();
   });
-  model.on("change:marks", () => { tell(); redraw(); });
-  model.on("change:running", () => { if (model.get("running")) show(model.get("running")); redraw(); });
+  model.on("change:marks", mark);
+  model.on("change:running", run);
+  model.on("change:locked", shut);
   model.on("msg:custom", (message) => { if (message.kind === "go") go(message.line, 0, 0); });
-  model.on("change:locked", lock);
-  function lock() { area.readOnly = model.get("locked"); box.classList.toggle("rds-editor-locked", area.readOnly); }
-  const sized = new ResizeObserver(redraw);
-  sized.observe(area);
-  lock();
-  tell();
-  redraw();
-  return () => { send(); sized.disconnect(); };
+  mark();
+  run();
+  shut();
+  return () => { send(); view.destroy(); };
 }
 
 export default { render };
