@@ -148,7 +148,7 @@ function render({ model, el }) {
     words.length ? [hover, CM.autocompletion({ override: [completions(words)], icons: false, selectOnOpen: false })] : [],
     // Enter ends the line: what is offered is taken once an arrow key has chosen it
     CM.keymap.of([{ key: "Mod-s", run: save, preventDefault: true }, ...CM.searchKeymap, ...CM.completionKeymap, ...CM.defaultKeymap, ...CM.historyKeymap]),
-    CM.EditorView.contentAttributes.of({ "aria-label": model.get("label"), autocapitalize: "off", autocorrect: "off", spellcheck: "false" }),
+    CM.EditorView.contentAttributes.of({ "aria-label": model.get("label"), tabindex: "0", autocapitalize: "off", autocorrect: "off", spellcheck: "false" }),
     CM.EditorView.updateListener.of((update) => {
       if (update.docChanged && !update.transactions.some((each) => each.annotation(CM.Transaction.remote))) {
         clearTimeout(timer);
