@@ -120,11 +120,9 @@ def _load(channel: Channel, kind: str, file: Path, count: Counted | None) -> Stu
     try:
         loaded = _functions(file) if kind == "functions" else _interface(kind, file)
     except BaseException as error:  # whatever a submission raises is its own doing: nobody else is in this process
-        cause = error
         if count:
             count.stop()
-            cause = runs.first_cause(error)
-        said = str(cause) if isinstance(cause, InputError) else student_error(cause, file)
+        said = str(error) if isinstance(error, InputError) else student_error(error, file)
         channel.tell_error(said)
         return None
     given = loaded if isinstance(loaded, StudentFile) else None
