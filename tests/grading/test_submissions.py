@@ -263,6 +263,17 @@ def test_vpl_s_download_has_the_newest_attempt_of_each_student(tmp_path: Path) -
     assert found["ben"].read() == b"ben" and found["cy"].status is Status.MISSING
 
 
+@pytest.mark.parametrize(
+    "around",
+    ["eve/Task/Version 1", "Student Work/Submitted files/eve/Task/Version 1", "submitted/eve/ps1", "Eve 5 eve/{time}"],
+)
+def test_the_only_one_to_hand_in_hands_in_for_nobody_else(around: str, tmp_path: Path) -> None:
+    folder = around.format(time="2026-01-05-10-12-33")
+    files = {f"{folder}/{who}/controller.py": who.encode() for who in ("ada", "ben")}
+    files |= {f"{folder}/timestamp.txt": b"2026-01-05 10:12:33 UTC"} if folder.endswith("ps1") else {}
+    assert list(of(zipped(tmp_path / "all.zip", files))) == ["eve"]
+
+
 def test_who_names_folders_by_times_decides_for_nobody_else(tmp_path: Path) -> None:
     files = {f"eve/2020-01-01-00-00-00/{n}.py": "eve" for n in range(9)}
     files |= {"Ada 7 x/controller.py": "ada", "Ben 8 y/controller.py": "ben"}

@@ -387,6 +387,9 @@ def _is_of_a_class(items: Sequence[Item], accepted: Sequence[str]) -> bool:
     in_folders = {item.parts[at - 1] for item in handed_in if len(item.parts) > at}
     is_one_s = any(without_number(name)[0] in accepted for name in alone)
     is_one_s |= bool(in_folders) and not alone and all(map(_is_part, in_folders))
+    around = handed_in[0].parts[: at - 1]  # what the only one to hand in has in it says nothing of others
+    is_one_s |= any(is_version(folder) or is_dated(folder) for folder in around)
+    is_one_s |= any(item.name == STAMP and item.parts[:-1] == around[: len(item.parts) - 1] for item in items)
     return not is_one_s and (len(in_folders) > 1 or len(alone) > 1)
 
 
