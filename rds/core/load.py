@@ -146,7 +146,7 @@ def _student(variables: Mapping[str, Any], source: Source, validate: bool) -> St
     functions = {name: f for name in ARGUMENTS if callable(f := variables.get(name)) and not inspect.isclass(f)}
     if not any(name in INTERFACES for name in functions):
         names = ", ".join(form(name) for name in INTERFACES)
-        hint = near_misses({k: v for k, v in variables.items() if _is_written_here(v, variables)})
+        hint = near_misses({k: v for k, v in variables.items() if _is_written_here(v, variables)}) or _inner(source)
         raise InputError(f"it defines none of {names}{'; ' + hint if hint else ''}", source.path or source.name)
     misfits = {name: fault for name, f in functions.items() if (fault := argument_fault(name, f))}
     if all(name in misfits for name in functions if name in INTERFACES):
@@ -198,6 +198,16 @@ def _form_fault(name: str, function: Callable[..., Any]) -> str | None:
     if name != "interpolate" and inspect.isgeneratorfunction(function):
         return f"{name}() is a generator; use `return`, not `yield`"
     return None
+
+
+def _inner(source: Source) -> str:
+    """Where a file defines a function of an interface, but within something that was not run; "" if nowhere."""
+    inner = ast.walk(ast.parse(source.text)) if source.path is not None and source.text is not None else ()
+    for node in inner:
+        if isinstance(node, ast.FunctionDef) and node.name in INTERFACES:
+            within = 'within something else, such as `if __name__ == "__main__":` or another function'
+            return f"{node.name}() in line {node.lineno} is {within}; move it out, to the left margin"
+    return ""
 
 
 def _is_written_here(value: Any, variables: Mapping[str, Any]) -> bool:
