@@ -247,7 +247,9 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     vars(traceback).update(
         walk_tb=_hidden(lambda tb: walk(tb, False)),
         _walk_tb_with_full_positions=_hidden(lambda tb: walk(tb, True)),
-        _compute_suggestion_error=_hidden(lambda *_: None),  # of a name that is not there: it looks for others in a frame
+        _compute_suggestion_error=_hidden(
+            lambda *_: None
+        ),  # of a name that is not there: it looks for others in a frame
     )
     # Collected by itself, garbage would have its finalizers, and `gc.callbacks`, run within the trace function, where
     # nothing is counted.
