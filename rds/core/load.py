@@ -28,7 +28,7 @@ from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near
 from rds.core.types import Controller, Reference, Source
 from rds.core.values import own_copy, shown
 
-__all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "student_error"]
+__all__ = ["StudentFile", "from_function", "from_namespace", "load_error", "load_student", "student_error"]
 
 STUDENT_MODULE = "rds_student_"  # how the names of modules begin that a student's file was loaded as
 _PYTHON = f"Python {sys.version_info.major}.{sys.version_info.minor}"
@@ -329,7 +329,7 @@ def _run(text: str, file: Path) -> dict[str, Any]:
         del sys.modules[module.__name__]
         if isinstance(error, KeyboardInterrupt):
             raise
-        raise _load_error(error, file) from error
+        raise load_error(error, file) from error
     return module.__dict__
 
 
@@ -361,7 +361,8 @@ def _is_inside(origin: str, folder: Path) -> bool:
     return path.is_relative_to(folder) and "site-packages" not in path.relative_to(folder).parts
 
 
-def _load_error(error: BaseException, file: Path) -> InputError:
+def load_error(error: BaseException, file: Path) -> InputError:
+    """What `file` raised while it was run as a module, with its place and the remedy."""
     line = student_line(error, file)
     where = f"{file}:{line}" if line else str(file)
     if isinstance(error, SyntaxError) and Path(error.filename or "") == file:

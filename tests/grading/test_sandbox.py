@@ -243,6 +243,21 @@ def test_what_cannot_be_loaded_is_said(text: str, said: str, pool: Pool, written
     assert caught.value.reason.isprintable()
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("import pandas", r"submission.py:1: .*what is graded must be in one file"),
+        ("x = (", r"submission.py:1: syntax error.*Python 3\.\d+ cannot read it"),
+        ("quit()", "remove the exit"),
+    ],
+)
+def test_functions_that_cannot_be_loaded_are_told_the_remedy(
+    text: str, said: str, pool: Pool, written: Callable[..., Path]
+) -> None:
+    with pytest.raises(SubmissionError, match=said):
+        pool.open(written(text, ""), kind="functions")
+
+
 def test_what_it_prints_is_kept(pool: Pool, written: Callable[..., Path]) -> None:
     with pool.open(written("print('hello \\x1b[2J world')\nimport sys\nprint('bad', file=sys.stderr)\n")) as subject:
         pass

@@ -17,7 +17,7 @@ import numpy.random  # here, before the forks: else each of them imports it anew
 
 from rds.core.blame import student_error
 from rds.core.errors import ContractError, InputError
-from rds.core.load import StudentFile, load_student
+from rds.core.load import StudentFile, load_error, load_student
 from rds.core.signature import INTERFACES, form
 from rds.grading.sandbox.door import Closed
 from rds.grading.sandbox.frames import FrameError
@@ -153,7 +153,10 @@ def _functions(file: Path) -> ModuleType:
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses and pickle look it up there
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except BaseException as error:  # as in `_load`
+        raise load_error(error, file) from error
     return module
 
 
