@@ -28,7 +28,7 @@ from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near
 from rds.core.types import Controller, Reference, Source
 from rds.core.values import own_copy, shown
 
-__all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "student_error"]
+__all__ = ["StudentFile", "from_function", "from_namespace", "load_error", "load_student", "student_error"]
 
 STUDENT_MODULE = "rds_student_"  # how the names of modules begin that a student's file was loaded as
 _PYTHON = f"Python {sys.version_info.major}.{sys.version_info.minor}"
@@ -146,7 +146,7 @@ def _student(variables: Mapping[str, Any], source: Source, validate: bool) -> St
     functions = {name: f for name in ARGUMENTS if callable(f := variables.get(name)) and not inspect.isclass(f)}
     if not any(name in INTERFACES for name in functions):
         names = ", ".join(form(name) for name in INTERFACES)
-        hint = near_misses({k: v for k, v in variables.items() if _is_written_here(v, variables)})
+        hint = near_misses({k: v for k, v in variables.items() if _is_written_here(v, variables)}) or _inner(source)
         raise InputError(f"it defines none of {names}{'; ' + hint if hint else ''}", source.path or source.name)
     misfits = {name: fault for name, f in functions.items() if (fault := argument_fault(name, f))}
     if all(name in misfits for name in functions if name in INTERFACES):
@@ -198,6 +198,16 @@ def _form_fault(name: str, function: Callable[..., Any]) -> str | None:
     if name != "interpolate" and inspect.isgeneratorfunction(function):
         return f"{name}() is a generator; use `return`, not `yield`"
     return None
+
+
+def _inner(source: Source) -> str:
+    """Where a file defines a function of an interface, but within something that was not run; "" if nowhere."""
+    inner = ast.walk(ast.parse(source.text)) if source.path is not None and source.text is not None else ()
+    for node in inner:
+        if isinstance(node, ast.FunctionDef) and node.name in INTERFACES:
+            within = 'within something else, such as `if __name__ == "__main__":` or another function'
+            return f"{node.name}() in line {node.lineno} is {within}; move it out, to the left margin"
+    return ""
 
 
 def _is_written_here(value: Any, variables: Mapping[str, Any]) -> bool:
@@ -319,7 +329,7 @@ def _run(text: str, file: Path) -> dict[str, Any]:
         del sys.modules[module.__name__]
         if isinstance(error, KeyboardInterrupt):
             raise
-        raise _load_error(error, file) from error
+        raise load_error(error, file) from error
     return module.__dict__
 
 
@@ -351,7 +361,8 @@ def _is_inside(origin: str, folder: Path) -> bool:
     return path.is_relative_to(folder) and "site-packages" not in path.relative_to(folder).parts
 
 
-def _load_error(error: BaseException, file: Path) -> InputError:
+def load_error(error: BaseException, file: Path) -> InputError:
+    """What `file` raised while it was run as a module, with its place and the remedy."""
     line = student_line(error, file)
     where = f"{file}:{line}" if line else str(file)
     if isinstance(error, SyntaxError) and Path(error.filename or "") == file:

@@ -91,6 +91,10 @@ def test_a_helper_with_the_name_of_an_interface_is_left_alone(write):
         (CONTROL.replace("control", "Control"), ["Control(); did you mean control()?"]),
         ("def derivative(t, x, u, params): return x", ["did you mean derivatives()?"]),
         ("class Law:\n    def control(self, t, r, y, state, params): return 0, state\n", ["class Law has a method"]),
+        (
+            f"if __name__ == '__main__':\n    {CONTROL.strip().splitlines()[0]} return 0, state\n",
+            ["in line 2", "left margin"],
+        ),
         ("import control\n", ["imported module"]),
         ("control = 3.0\n", ["control` is 3.0, not a function"]),
         (

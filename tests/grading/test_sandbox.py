@@ -243,6 +243,21 @@ def test_what_cannot_be_loaded_is_said(text: str, said: str, pool: Pool, written
     assert caught.value.reason.isprintable()
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("import pandas", r"submission.py:1: .*what is graded must be in one file"),
+        ("x = (", r"submission.py:1: syntax error.*Python 3\.\d+ cannot read it"),
+        ("quit()", "remove the exit"),
+    ],
+)
+def test_functions_that_cannot_be_loaded_are_told_the_remedy(
+    text: str, said: str, pool: Pool, written: Callable[..., Path]
+) -> None:
+    with pytest.raises(SubmissionError, match=said):
+        pool.open(written(text, ""), kind="functions")
+
+
 def test_what_it_prints_is_kept(pool: Pool, written: Callable[..., Path]) -> None:
     with pool.open(written("print('hello \\x1b[2J world')\nimport sys\nprint('bad', file=sys.stderr)\n")) as subject:
         pass
@@ -312,6 +327,19 @@ def test_what_a_file_says_for_its_author_s_computer_does_no_harm(
     with pool.open(written(AT_HOME[name])) as subject:
         subject.begin_control()
         assert isinstance(subject.control(0.0, Reference(1.0, 0.0, 0.0), 0.0), float)
+
+
+def test_what_python_adds_for_who_sits_before_it_is_there(pool: Pool, written: Callable[..., Path]) -> None:
+    with pool.open(written("help(len)\nprint(quit, copyright, credits, license, sep='')\n")) as subject:
+        assert "Return the number of items" in subject.output and "NameError" not in subject.output
+    with pytest.raises(SubmissionError, match=r"it ends the program while it loads: .*SystemExit.*remove the exit"):
+        pool.open(written("exit()\n"))
+    law = "def control(t, r, y, state, params):\n    if y > 1.0:\n        quit()\n    return 1.0, state\n"
+    with pool.open(written(law, "")) as subject:
+        subject.begin_control(T=T)
+        subject.control(0.0, Reference(1.0, 0.0, 0.0), 0.0)
+        with pytest.raises(SubmissionError, match="SystemExit"):
+            subject.control(T, Reference(1.0, 0.0, 0.0), 2.0)
 
 
 def test_who_runs_an_experiment_while_the_file_is_loaded_is_told_what_to_do(

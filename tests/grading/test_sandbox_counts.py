@@ -228,6 +228,26 @@ else: found["raise"] = signal.raise_signal
             total = n
         return min(abs(r.position - y), 1.0), state""",
     ),
+    "the frames of an error": (
+        """
+import traceback
+class Error:
+    tb_lasti, tb_lineno = 0, 1
+    tb_frame = property(lambda self: found["error"].tb_frame)
+    tb_next = property(lambda self: found["error"].tb_frame and None)
+def quiet():
+    try: raise ValueError
+    except ValueError as error: found["error"] = error.__traceback__
+    for trace in (found["error"], Error()):
+        for walk in (traceback.walk_tb, traceback._walk_tb_with_full_positions):
+            try:
+                for frame, _ in walk(trace):
+                    frame.f_trace_lines = False
+                    while frame.f_back: frame = frame.f_back
+            except (AttributeError, RuntimeError): pass
+""",
+        "quiet()\n    for n in range(30): total = n * n\n    return min(abs(r.position - y), 1.0), state",
+    ),
     "an audit hook": (
         "sys.addaudithook(lambda event, args: work() if event == 'mine' else None)",
         "before = done[0]; sys.audit('mine')\n    if done[0] > before: return min(abs(r.position - y), 1.0), state",
@@ -332,7 +352,11 @@ def test_no_way_leads_to_the_counter(way: str, pool: Pool, written: Written) -> 
 
 def test_what_python_itself_asks_frames_for_is_there(pool: Pool, written: Written) -> None:
     text = """
-import collections, enum, logging, signal, sys, typing, warnings
+import collections, enum, logging, signal, sys, traceback, typing, warnings
+try: print_twice(traceback)
+except NameError as error: traceback.print_exc(); known = error.__traceback__
+assert traceback.extract_tb(known)[0][:3] == (__file__, 3, "<module>")
+assert [line for _, line in traceback.walk_tb(known)] == [3]
 logging.basicConfig(filename="log.txt", level=logging.DEBUG, format="%(funcName)s %(message)s")
 frame, names = sys._getframe(), []
 while frame is not None:
@@ -354,6 +378,8 @@ def control(t, r, y, state, params):
     signal.raise_signal(signal.SIGUSR1)
     logging.debug("a sample")
     assert open("log.txt").read().startswith("control a sample")
+    try: [][0]
+    except IndexError: logging.exception("no number")
     Inner = collections.namedtuple("Inner", "a")
     return float(Pair(1.0, Mode.ON).a), state
 """

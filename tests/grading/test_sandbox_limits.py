@@ -20,6 +20,13 @@ ATTACKS = {
     "endless loop": ("while True: pass", Limits(load_seconds=0.5), Status.TIMED_OUT, "no answer for 0.5 s"),
     "sleep": ("import time; time.sleep(60)", Limits(load_seconds=0.5), Status.TIMED_OUT, "no answer for 0.5 s"),
     "computing": ("while True: pass", Limits(cpu_seconds=0.3), Status.TIMED_OUT, "computing time"),
+    "computing that nobody looked at in time": (
+        "import resource, signal\nsoft, hard = resource.getrlimit(resource.RLIMIT_CPU)\n"
+        "if soft < hard: signal.raise_signal(signal.SIGXCPU)  # as the kernel does then; at the hard limit it kills\n",
+        Limits(),
+        Status.TIMED_OUT,
+        "more computing time than is allowed",
+    ),
     "fork bomb": (
         "import os\nwhile True:\n    try: os.fork()\n    except OSError: pass\n",
         Limits(cpu_seconds=1.0),

@@ -239,6 +239,48 @@ def test_nobody_hands_in_earlier_by_a_name_in_brightspace(tmp_path: Path) -> Non
     assert found["Eve - Jan 1, 2020 100 AM_111"].time == datetime(2026, 1, 5, 10, 12, tzinfo=CET)
 
 
+def test_vpl_s_download_has_the_newest_attempt_of_each_student(tmp_path: Path) -> None:
+    ada = {
+        "Lovelace Ada 101 ada/2026-01-05-10-12-33/controller.py": "first",
+        "Lovelace Ada 101 ada/2026-01-06-10-12-33/law.py": "second",
+        "Lovelace Ada 101 ada/2026-01-06-10-12-33.ceg/compilation.txt": "what VPL said",
+        "Report.txt": "Number of users: 1",
+    }
+    ben = {f"Ö Ben 7 x 102 ben/2026-01-05-10-12-34/{n}/2020-01-01-00-00-00/more.py": "" for n in range(9)}
+    ben["Ö Ben 7 x 102 ben/2026-01-05-10-12-34/controller.py"] = "ben"
+    group = {"red Group 12 /2026-01-05-10-12-35/controller.py": "group"}
+    for files in ({**ada}, {**ada, **ben, **group, "Cy 103 cy/2026-01-05-10-12-33/report.pdf": ""}):
+        put(tmp_path / f"{len(files)}", files)
+        packed = zipped(tmp_path / "all.zip", {name: text.encode() for name, text in files.items()})
+        for place in (packed, tmp_path / f"{len(files)}"):
+            intake = collect(place, ACCEPTED, zone=CET)
+            found = rows(intake)
+            assert intake.layout == "vpl" and found["ada"].read() == b"second"
+            assert found["ada"].time == datetime(2026, 1, 6, 10, 12, 33, tzinfo=CET)
+            assert found["ada"].source == {"platform": "vpl", "name": "Lovelace Ada", "user": "101"}
+            assert "the newest is graded (2026-01-06-10-12-33)" in found["ada"].notes[0]
+    assert list(found) == ["ada", "ben", "cy", "red Group_12"]
+    assert found["ben"].read() == b"ben" and found["cy"].status is Status.MISSING
+
+
+@pytest.mark.parametrize(
+    "around",
+    ["eve/Task/Version 1", "Student Work/Submitted files/eve/Task/Version 1", "submitted/eve/ps1", "Eve 5 eve/{time}"],
+)
+def test_the_only_one_to_hand_in_hands_in_for_nobody_else(around: str, tmp_path: Path) -> None:
+    folder = around.format(time="2026-01-05-10-12-33")
+    files = {f"{folder}/{who}/controller.py": who.encode() for who in ("ada", "ben")}
+    files |= {f"{folder}/timestamp.txt": b"2026-01-05 10:12:33 UTC"} if folder.endswith("ps1") else {}
+    assert list(of(zipped(tmp_path / "all.zip", files))) == ["eve"]
+
+
+def test_who_names_folders_by_times_decides_for_nobody_else(tmp_path: Path) -> None:
+    files = {f"eve/2020-01-01-00-00-00/{n}.py": "eve" for n in range(9)}
+    files |= {"Ada 7 x/controller.py": "ada", "Ben 8 y/controller.py": "ben"}
+    found = of(zipped(tmp_path / "all.zip", {name: text.encode() for name, text in files.items()}))
+    assert list(found) == ["Ada 7 x", "Ben 8 y", "eve"] and found["eve"].time is None
+
+
 @pytest.mark.parametrize("around", ["", "Submitted files/", "Student Work/Submitted files/"])
 @pytest.mark.parametrize("others", [{"Ben/Task/Version 1/controller.py": "only"}, {}])
 def test_the_last_version_of_teams_counts(around: str, others: dict[str, str], tmp_path: Path) -> None:

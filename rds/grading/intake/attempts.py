@@ -12,6 +12,13 @@ from rds.grading.intake.names import shown
 
 _VERSION = re.compile(r"Version (\d{1,6})")  # the folder that Teams makes for each time of handing in
 
+_DATED = re.compile(r"\d{4}(?:-\d\d){5}")  # the one that VPL makes
+
+
+def is_dated(folder: str) -> bool:
+    """Whether a folder is one attempt in VPL, called by its time."""
+    return bool(_DATED.fullmatch(folder))
+
 
 def is_version(folder: str) -> bool:
     """Whether a folder is one attempt in Teams."""

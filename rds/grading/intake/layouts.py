@@ -5,6 +5,7 @@ Ada Lovelace_12345_assignsubmission_file_/controller.py  Moodle, also without th
 lovelaceada_LATE_12345_67890_controller-1.py             Canvas
 Task 1_ada_attempt_2026-01-09-10-00-00_controller.py     Blackboard
 111-67890 - Ada Lovelace - Jan 5, 2026 1012 AM/x.py      Brightspace, also without the folder
+Lovelace Ada 101 ada/2026-01-05-10-12-33/controller.py   VPL of Moodle, a folder for each time of handing in
 submission_12345/controller.py, submission_metadata.yml  Gradescope
 ada/controller.py, ada.py                                a folder, or a file, of each student
 """
@@ -18,7 +19,7 @@ from datetime import datetime
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.grading.intake.attempts import is_version
+from rds.grading.intake.attempts import is_dated, is_version
 from rds.grading.intake.gradescope import METADATA, Submitter, read_metadata
 from rds.grading.intake.items import Item
 from rds.grading.intake.names import shown, without_number
@@ -48,6 +49,7 @@ _BRIGHTSPACE_FOLDER = re.compile(
 )
 _BRIGHTSPACE = re.compile(_BRIGHTSPACE_FOLDER.pattern + r"(?: - (?P<file>.+))?", re.DOTALL)
 _BRIGHTSPACE_TIMES = ("%b %d, %Y", "%B %d, %Y", "%d %b, %Y", "%d %B, %Y", "%d %b %Y", "%d %B %Y", "%Y-%m-%d")
+_VPL_FOLDER = re.compile(r"(?P<name>.+) (?P<id>\d+) (?P<user>\S*)", re.DOTALL)  # a group has no user
 _CANVAS = re.compile(r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<id>\d+)_(?P<number>\d+)_(?P<file>.+)", re.DOTALL)
 
 
@@ -108,6 +110,12 @@ def sorted_out(
     if _mostly(items, lambda item: _BRIGHTSPACE.fullmatch(item.parts[0])):
         sorting.brightspace(items, folders)
         return sorting.layout("brightspace", times)
+    if _is_vpl(items):
+        for item in items:
+            sorting.vpl(item)
+        for name in folders:
+            sorting.files_of_vpl(name)
+        return sorting.layout("vpl", times)
     if _mostly(items, lambda item: len(item.parts) == 1 and _CANVAS.fullmatch(item.name)):
         for item in items:
             sorting.canvas(item)
@@ -246,10 +254,7 @@ class _Sorting:
             handed = self.files_of(match["user"] if alone else match["before"], platform="blackboard")
             handed.has_times = True
             if match["file"]:
-                try:
-                    when = datetime.strptime(match["time"], "%Y-%m-%d-%H-%M-%S")
-                except ValueError:
-                    when = None
+                when = _dashed_time(match["time"])
                 handed.items.append(replace(item, parts=(match["file"],), time=when, attempt=match["time"]))
 
     def brightspace(self, items: Sequence[Item], folders: Sequence[str]) -> None:
@@ -289,6 +294,27 @@ class _Sorting:
             else:
                 self.files_of(folder)
 
+    def files_of_vpl(self, folder: str) -> StudentFiles:
+        found = _VPL_FOLDER.fullmatch(folder)
+        if found is None:
+            return self.files_of(folder)
+        name, number = found["name"], found["id"]
+        return self.files_of(found["user"] or f"{name}_{number}", platform="vpl", name=shown(name), user=number)
+
+    def vpl(self, item: Item) -> None:
+        """<student>/<time>/…; beside each of these, <time>.ceg holds what VPL said of it."""
+        if len(item.parts) == 1:
+            self.plain(item)
+            return
+        folder, inner = self.files_of_vpl(item.parts[0]), item.parts[1]
+        if len(item.parts) > 2 and is_dated(inner.removesuffix(".ceg")):
+            if inner.endswith(".ceg"):
+                return
+            folder.has_times = True
+            folder.items.append(replace(item, parts=item.parts[2:], time=_dashed_time(inner), attempt=inner))
+        else:
+            folder.items.append(replace(item, parts=item.parts[1:], time=None))
+
     def files_of_gradescope(self, folder: str, submitters: dict[str, Submitter]) -> StudentFiles:
         who = submitters.get(folder)
         if who is None:
@@ -307,6 +333,14 @@ class _Sorting:
         handed.has_times |= who is not None
         when = None if who is None else who.time
         handed.items.append(replace(item, parts=item.parts[1:], time=when, attempt=item.parts[0]))
+
+
+def _dashed_time(said: str) -> datetime | None:
+    """As in "2026-01-09-10-00-00"; None for what is no time."""
+    try:
+        return datetime.strptime(said, "%Y-%m-%d-%H-%M-%S")
+    except ValueError:
+        return None
 
 
 def _brightspace_time(said: str) -> datetime | None:
@@ -353,18 +387,28 @@ def _is_of_a_class(items: Sequence[Item], accepted: Sequence[str]) -> bool:
     in_folders = {item.parts[at - 1] for item in handed_in if len(item.parts) > at}
     is_one_s = any(without_number(name)[0] in accepted for name in alone)
     is_one_s |= bool(in_folders) and not alone and all(map(_is_part, in_folders))
+    around = handed_in[0].parts[: at - 1]  # what the only one to hand in has in it says nothing of others
+    is_one_s |= any(is_version(folder) or is_dated(folder) for folder in around)
+    is_one_s |= any(item.name == STAMP and item.parts[:-1] == around[: len(item.parts) - 1] for item in items)
     return not is_one_s and (len(in_folders) > 1 or len(alone) > 1)
 
 
 def _is_part(folder: str) -> bool:
     """Whether a folder is called as one inside a submission is."""
-    return is_version(folder) or folder.lower() in _PARTS
+    return is_version(folder) or is_dated(folder) or folder.lower() in _PARTS
 
 
 def _mostly(items: Sequence[Item], fits: Any) -> bool:
     """Of the files that may be submissions more than half; one with a strange name changes nothing."""
     counted = [item for item in items if item.is_code or item.is_archive]
     return 2 * sum(1 for item in counted if fits(item)) > len(counted)
+
+
+def _is_vpl(items: Sequence[Item]) -> bool:
+    """Whether all that more than half of the students handed in lies in folders called by times."""
+    students = {item.parts[0] for item in items if item.is_handed_in}
+    others = {item.parts[0] for item in items if item.is_handed_in and not (item.parts[2:] and is_dated(item.parts[1]))}
+    return 2 * len(others) < len(students)
 
 
 def _is_nbgrader(items: Sequence[Item], assignments: Sequence[str]) -> bool:

@@ -18,9 +18,11 @@ import gc
 import os
 import resource
 import sys
+import traceback
 from _functools import _lru_cache_wrapper  # type: ignore[import-not-found] # not functools': that may be Python
 from collections.abc import Callable, Iterator, Sequence
-from types import CodeType, FrameType, ModuleType, SimpleNamespace
+from itertools import islice
+from types import CodeType, FrameType, ModuleType, SimpleNamespace, TracebackType
 from typing import Any, NamedTuple
 
 from rds.grading.sandbox.door import Closed
@@ -62,12 +64,13 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     starts, last_part, exactly, length, call_tracing = str.startswith, str.rpartition, type, len, sys.call_tracing
     plain = str.__str__  # of a text of a class of its own, without the methods of that class
     read, write, identity, as_float, refusal = os.read, os.write, id, float, RuntimeError
+    each_of, from_there, following, traces = iter, islice, next, TracebackType
     unpack, pack, asked, answered = layout.question.unpack, layout.answer.pack, layout.question.size, layout.answer.size
     padding = [0.0] * (layout.answers - 1)
     # with the codes themselves: that of a function which is exchanged would make room for another with its number
     uncounted = {identity(code): code for module in (*own, sys.modules[__name__]) for code in _codes(module)}
     there = frozenset(sys.builtin_module_names) & sys.modules.keys()
-    events, since, before, runs, is_open, may_look, may_trace = 0, 0, 0, False, False, False, False
+    events, since, before, runs, is_open, may_look, may_see, may_trace = 0, 0, 0, False, False, False, False, False
     known: dict[int, tuple[CodeType, bool]] = {}
     secret: int | None = seal
 
@@ -108,8 +111,11 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
 
     def guard(event: str, args: tuple[Any, ...]) -> None:
         """Audit hook, which nobody can take away again."""
-        nonlocal may_look, may_trace
+        nonlocal may_look, may_see, may_trace
         if is_open:
+            return
+        if may_see and event == "object.__getattr__":
+            may_see = False
             return
         if may_trace and event == "sys.settrace":
             may_trace = False
@@ -147,6 +153,23 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
                 f_back=found,
             )
         return found
+
+    def walk(tb: Any, whole: bool) -> Iterator[Any]:
+        """What `traceback` looks for in the frames of an error, and not the frames; with their places if `whole`."""
+        nonlocal may_see
+        found: list[Any] = []
+        while exactly(tb) is traces:
+            may_see = True  # nothing of anybody's runs before the guard has seen it
+            frame = tb.tb_frame
+            may_see = False
+            code, at, place = frame.f_code, tb.tb_lasti, None
+            if whole:
+                place = following(from_there(code.co_positions(), at // 2, None), None) if at >= 0 else None
+                place = place if place and place[0] is not None else (tb.tb_lineno, *(place or (None,) * 4)[1:])
+            shown = attributes(f_globals=frame.f_globals, f_code=code, f_lineno=tb.tb_lineno, f_lasti=at)
+            found += ((shown, place if whole else tb.tb_lineno),)
+            tb = tb.tb_next
+        return each_of(found)
 
     def create_new(spec: Any) -> Any:
         """A module of the interpreter's own, but none a second time: it would have all that was exchanged in it."""
@@ -221,6 +244,13 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     sys.gettrace = sys.getprofile = lambda: None  # it looks like a run that is not counted
     sys.settrace, sys.setprofile = quiet(settrace), quiet(setprofile)
     sys._getframe, _imp.create_builtin, _signal.signal = _hidden(look), _hidden(create_new), _hidden(handle)
+    vars(traceback).update(
+        walk_tb=_hidden(lambda tb: walk(tb, False)),
+        _walk_tb_with_full_positions=_hidden(lambda tb: walk(tb, True)),
+        _compute_suggestion_error=_hidden(
+            lambda *_: None
+        ),  # of a name that is not there: it looks for others in a frame
+    )
     # Collected by itself, garbage would have its finalizers, and `gc.callbacks`, run within the trace function, where
     # nothing is counted.
     gc.disable()

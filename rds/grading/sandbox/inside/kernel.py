@@ -58,11 +58,11 @@ def filter_calls(program: bytes) -> None:
     _check(_libc.prctl(_PR_SET_SECCOMP, _SECCOMP_MODE_FILTER, ctypes.byref(whole), 0, 0), "seccomp")
 
 
-def limit(which: int, most: int) -> None:
-    """A resource limit, soft and hard; lower where the hard limit is lower already."""
+def limit(which: int, most: int, beyond: int = 0) -> None:
+    """A resource limit, soft, and hard `beyond` that; lower where the hard limit is lower already."""
     _, hard = resource.getrlimit(which)
-    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-    resource.setrlimit(which, (most, most))
+    soft, most = (each if hard == resource.RLIM_INFINITY else min(each, hard) for each in (most, most + beyond))
+    resource.setrlimit(which, (soft, most))
 
 
 def _check(answer: int, what: str) -> None:

@@ -173,27 +173,15 @@ def _segment(data: dict[str, Any]) -> Segment:
     return ArcSegment(**fields) if fields.pop("kind") == "arc" else LineSegment(**fields)
 
 
-def first_cause(error: BaseException) -> BaseException:
-    """What an error is about whose explanation has failed, as frames may not be looked at while the work is counted."""
-    for _ in range(8):  # an author can tie a ring of errors
-        said = error.args[0] if type(error) is RuntimeError and error.args else None
-        if type(said) is not str or not said.startswith("tb_frame ") or error.__context__ is None:
-            break
-        error = error.__context__
-    return error
-
-
 def _refuse(channel: Channel, error: BaseException, student: StudentFile, counted: Counted | None) -> None:
     if counted:
         counted.stop()
-        error = first_cause(error)
     channel.tell_error(_said(error, student))
 
 
 def _explain(channel: Channel, error: BaseException, student: StudentFile, t: float, counted: Counted | None) -> None:
     if counted:
         counted.stop()
-        error = first_cause(error)
     said = _said(error, student)
     channel.tell_error(said if f"t = {t:.3f}" in said else f"at t = {t:.3f} s: {said}")
 

@@ -47,7 +47,8 @@ def confine(limits: Mapping[str, Any], baseline_bytes: int, calls: bytes, cpus: 
     if cpus:
         os.sched_setaffinity(0, cpus)
     kernel.limit(resource.RLIMIT_AS, baseline_bytes + int(limits["memory_bytes"]))
-    kernel.limit(resource.RLIMIT_CPU, int(limits["cpu_seconds"]) + 2)  # the supervisor, which sums, comes first
+    # the supervisor, which sums, comes first; the hard limit kills without a word, the soft one says which limit it is
+    kernel.limit(resource.RLIMIT_CPU, int(limits["cpu_seconds"]) + 2, beyond=1)
     kernel.limit(resource.RLIMIT_NPROC, int(limits["processes"]) + 1)  # and the init above it
     kernel.limit(resource.RLIMIT_FSIZE, int(limits["file_bytes"]))
     kernel.limit(resource.RLIMIT_NOFILE, _FILES)

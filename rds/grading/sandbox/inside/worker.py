@@ -17,7 +17,7 @@ import numpy.random  # here, before the forks: else each of them imports it anew
 
 from rds.core.blame import student_error
 from rds.core.errors import ContractError, InputError
-from rds.core.load import StudentFile, load_student
+from rds.core.load import StudentFile, load_error, load_student
 from rds.core.signature import INTERFACES, form
 from rds.grading.sandbox.door import Closed
 from rds.grading.sandbox.frames import FrameError
@@ -120,11 +120,9 @@ def _load(channel: Channel, kind: str, file: Path, count: Counted | None) -> Stu
     try:
         loaded = _functions(file) if kind == "functions" else _interface(kind, file)
     except BaseException as error:  # whatever a submission raises is its own doing: nobody else is in this process
-        cause = error
         if count:
             count.stop()
-            cause = runs.first_cause(error)
-        said = str(cause) if isinstance(cause, InputError) else student_error(cause, file)
+        said = str(error) if isinstance(error, InputError) else student_error(error, file)
         channel.tell_error(said)
         return None
     given = loaded if isinstance(loaded, StudentFile) else None
@@ -155,7 +153,10 @@ def _functions(file: Path) -> ModuleType:
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses and pickle look it up there
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except BaseException as error:  # as in `_load`
+        raise load_error(error, file) from error
     return module
 
 
