@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -283,7 +284,9 @@ def _is_even(values: np.ndarray) -> bool:
 
 
 def _tokens(name: str) -> list[str]:
-    return [word for word in re.split(r"[^A-Za-z0-9]+|(?<=[a-z])(?=[A-Z])", name) if word]
+    """The words of a name without their accents: an accent is no gap between words, a Chinese character is one."""
+    plain = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
+    return [word for word in re.split(r"[\W_\u2e80-\uffff]+|(?<=[a-z])(?=[A-Z])", plain) if word]
 
 
 def _role(name: str) -> str | None:
