@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.identification.logs import sampling
 from rds.identification.logs.log import Finding, Log
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.steps import step_of
@@ -302,6 +303,22 @@ def test_sampling_that_is_too_slow_is_told_with_the_period_that_would_do(tmp_pat
     finding = grave(slow)["sampling"]
     assert "within its sample period of 50 ms" in finding.what and "ms or less tells it" in finding.what
     assert "sampling" not in grave(read(tmp_path, rows))
+
+
+@pytest.mark.parametrize("every", [1, 2, 5])
+def test_positions_that_are_repeated_are_told_with_their_period(every: int) -> None:
+    """Measured every 2 ms and logged every 1 ms: a fit had a time constant 5 % too long, 50 standard errors, unsaid.
+
+    Not told of a coarse encoder, nor of an axis at rest or slow.
+    """
+    T = np.arange(2000)
+    way = 20.0 * np.sin(2 * np.pi * T / 500.0)
+    read = np.round(way[T // every * every], 3)
+    found = sampling.repeated(Log("made", 1e-3 * T, 0.0 * T, read, resolution=1e-3), None)
+    assert [f"is new in one of {every} samples only" in f.what for f in found] == [True] * (every > 1)
+    assert not found or found[0].sample == every * (found[0].sample // every) + 1
+    for still in (np.round(way / 0.2) * 0.2, np.where(T % 100 < 50, 0.0, way), np.round(way / 1e4, 3)):
+        assert not sampling.repeated(Log("made", 1e-3 * T, 0.0 * T, still, resolution=None), None)
 
 
 def test_ripples_of_a_filter_are_no_leaps_of_an_encoder(tmp_path: Path) -> None:
