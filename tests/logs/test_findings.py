@@ -257,6 +257,7 @@ def rows(time: str, command: str, position: str, count: int = 200) -> str:
             rows("{c}", "{j}", "{k}"),
             r"'time' stays the same in 180 of 200 rows: .* rate = [\d.]+ \(Hz, as its stamps go",
         ),
+        (rows("{c}", "{j}", "{k}", 35), r" rate = 10 \(Hz, as its stamps go"),  # a line through few stamps says 10.2
         (rows("1", "{j}", "{k}"), r"'time' does not increase from row to row \(200 rows\)"),
         (rows("{i}", "{j}", "nan"), "position has no number in 200 of 200 samples"),
         (rows("{i}", "{j}", "inf"), "position has no number in 200 of 200 samples"),

@@ -213,8 +213,11 @@ def _why_no_time(column: Column) -> str:
         if dimension(column.unit or "") != "time":
             return sentence + "rate = ... (in Hz) under [time] in place of the column"
         there = column.values[np.isfinite(column.values)]
-        slope = float(np.polyfit(np.arange(len(there)), there, 1)[0]) * factor(str(column.unit), "s")
-        return sentence + f"rate = {1.0 / slope:.4g} (Hz, as its stamps go on the whole) under [time] in its place"
+        new = np.flatnonzero(np.diff(there)) + 1  # a stamp is right where it is new
+        if len(new) < 2:
+            return sentence + "rate = ... (in Hz) under [time] in its place"
+        rate = (new[-1] - new[0]) / ((there[new[-1]] - there[new[0]]) * factor(str(column.unit), "s"))
+        return sentence + f"rate = {rate:.4g} (Hz, as its stamps go on the whole) under [time] in its place"
     return f"{column.name!r} does not increase from row to row ({rows} rows)"
 
 
