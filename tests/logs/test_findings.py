@@ -318,6 +318,7 @@ def test_positions_that_are_repeated_are_told_with_their_period(every: int) -> N
     found = sampling.repeated(Log("made", 1e-3 * T, 0.0 * T, read, resolution=1e-3), None)
     assert [f"is new in one of {every} samples only" in f.what for f in found] == [True] * (every > 1)
     assert not found or found[0].sample == every * (found[0].sample // every) + 1
+    assert not sampling.repeated(Log("made", 1e-3 * T, 0.0 * T, read, units={"position": "mm/s"}), None)
     for still in (np.round(way / 0.2) * 0.2, np.where(T % 100 < 50, 0.0, way), np.round(way / 1e4, 3)):
         assert not sampling.repeated(Log("made", 1e-3 * T, 0.0 * T, still, resolution=None), None)
 
