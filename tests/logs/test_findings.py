@@ -341,5 +341,7 @@ def test_levels_that_are_each_held_are_no_limit(tmp_path: Path) -> None:
     held = np.repeat(levels, 100)
     columns = axis(6000) | {"voltage": held}
     assert "saturation" not in grave(read(tmp_path, columns))
+    ramp = np.maximum(np.linspace(-3.0, 6.0, 6000), 0.0)  # one way, after a rest
+    assert "saturation" not in grave(read(tmp_path, columns | {"voltage": ramp}))
     clipped = np.clip(held, -4.0, 4.0)
     assert "limited?" in grave(read(tmp_path, columns | {"voltage": clipped}))["saturation"].what
