@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rds.machines.machine import Machine
 
 TIP, ZERO = "tool_tip", "work_zero"
+_FLANGE = "tool0"
 _TURN = 360.0  # degrees: limits of a joint of type continuous
 _MM = 1000.0
 _SAME = 1e-12
@@ -73,8 +74,9 @@ def urdf_text(machine: Machine) -> str:
 
 
 def machine_text_of_urdf(text: str, name: str, path: str = "") -> str:
-    """The machine's file of a URDF, as TOML. Its links `tool_tip` and `work_zero` are tool and work; without them the
-    last link is the tool and the root the work. InputError for what is no such chain."""
+    """The machine's file of a URDF, as TOML. Its links `tool_tip` and `work_zero` are tool and work; without them
+    `tool0` (so it is called at robots), else the last link is the tool, and the root the work. InputError for what is
+    no such chain."""
     if "<!DOCTYPE" in text.upper():
         raise InputError("a URDF has no DOCTYPE; remove it", path)
     try:
@@ -108,9 +110,25 @@ def machine_text_of_urdf(text: str, name: str, path: str = "") -> str:
     if not axes:
         raise InputError("no joint moves: types prismatic, revolute and continuous do", path)
     table = {"name": name, "title": f"From the URDF of {robot.get('name', name)}", "sample_period": 0.001, "axis": axes}
-    ends = {"tool": frames.get(TIP, links[-1]["name"]), "work": frames.get(ZERO, BED)}
+    tool = next((frames[end] for end in (TIP, _FLANGE) if end in frames), links[-1]["name"])
+    ends = {"tool": tool, "work": frames.get(ZERO, BED)}
     about = "Nodes, encoders and sample period are chosen; yours to add: axis.NAME.model and axis.NAME.limits."
+    links, frames_only = _without_frames(links, set(ends.values()))
+    if frames_only:
+        about += f"\nFrames of the URDF that carry nothing are left out: {', '.join(frames_only)}."
     return toml_text(table | {key: {"link": link} for key, link in ends.items()} | {"link": links}, about)
+
+
+def _without_frames(links: list[dict[str, Any]], ends: set[str]) -> tuple[list[dict[str, Any]], list[str]]:
+    """The links without fixed ones that carry nothing, as the frame `base` of most robots; and the names of these."""
+    left_out: list[str] = []
+    while True:
+        carrying = {link["parent"] for link in links} | ends
+        idle = [link["name"] for link in links if "axis" not in link and link["name"] not in carrying]
+        if not idle:
+            return links, left_out
+        left_out += idle
+        links = [link for link in links if link["name"] not in idle]
 
 
 def _read_joint(

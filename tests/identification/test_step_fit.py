@@ -101,6 +101,17 @@ def test_an_axis_comes_back_within_half_a_per_cent() -> None:
     assert estimate.free_run["X"].fit_percent > 99.0
 
 
+def test_the_delay_of_an_axis_is_found_though_the_search_begins_at_none() -> None:
+    """It ended where it began, at a delay of 0, which was called not determined by the data."""
+    u = np.repeat([2.0, 4.0, 3.0, 6.0, 2.5, 5.0, -2.0, -4.0], 400)
+    t = np.arange(len(u)) * T
+    truth = {"tau": 12e-3, "K": 12.0, "friction_plus": 7.2, "friction_minus": -6.0, "delay": 4.2e-3}
+    y = structure("axis", ["delay"]).respond(t, u, [0.0, 0.0], truth)
+    estimate = fit([Log("X", t, u, np.round(y, 3), resolution=1e-3)], structure("axis", ["delay"]), "step")
+    assert estimate.values()["delay"] == pytest.approx(4.2e-3, rel=0.02) and not estimate.unidentifiable
+    assert estimate.values()["tau"] == pytest.approx(12e-3, rel=0.005)
+
+
 def test_a_square_voltage_turns_at_every_step_and_is_enough_with_two_sizes() -> None:
     log = axis_log(1, [2.0, -2.0, 2.0, -2.0, 4.0, -4.0, 4.0, -4.0])
     estimate = fit([log], structure("axis"), "step")

@@ -80,6 +80,15 @@ def test_a_preamble_and_remarks_between_rows_and_a_windows_code_page(tmp_path: P
     assert [f.kind for f in table.findings] == ["encoding", "comments"]
 
 
+@pytest.mark.parametrize(("heading", "gravity"), [("位置 [mm]", "note"), ("モーター [mm]", "warning")])
+def test_a_heading_of_another_code_page_gets_the_remedy(tmp_path: Path, heading: str, gravity: str) -> None:
+    """Code page 1252 leaves five bytes undefined: where a heading has one, the file is surely of another code page."""
+    path = tmp_path / "log.csv"
+    path.write_bytes(f"t [s],{heading}\n0,1\n1,2\n".encode("shift-jis"))
+    (finding,) = read_csv(path).findings
+    assert finding.gravity == gravity and "another code page: save it as UTF-8" in finding.what
+
+
 LONG = "".join(f"{i / 1e3:.6f},1.000000,{i / 1e2:.6f}\n" for i in range(4000)).encode()  # beyond what is looked at
 
 

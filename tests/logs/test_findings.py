@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.identification.logs import sampling
 from rds.identification.logs.log import Finding, Log
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.steps import step_of
@@ -256,6 +257,7 @@ def rows(time: str, command: str, position: str, count: int = 200) -> str:
             rows("{c}", "{j}", "{k}"),
             r"'time' stays the same in 180 of 200 rows: .* rate = [\d.]+ \(Hz, as its stamps go",
         ),
+        (rows("{c}", "{j}", "{k}", 35), r" rate = 10 \(Hz, as its stamps go"),  # a line through few stamps says 10.2
         (rows("1", "{j}", "{k}"), r"'time' does not increase from row to row \(200 rows\)"),
         (rows("{i}", "{j}", "nan"), "position has no number in 200 of 200 samples"),
         (rows("{i}", "{j}", "inf"), "position has no number in 200 of 200 samples"),
@@ -304,6 +306,23 @@ def test_sampling_that_is_too_slow_is_told_with_the_period_that_would_do(tmp_pat
     assert "sampling" not in grave(read(tmp_path, rows))
 
 
+@pytest.mark.parametrize("every", [1, 2, 5])
+def test_positions_that_are_repeated_are_told_with_their_period(every: int) -> None:
+    """Measured every 2 ms and logged every 1 ms: a fit had a time constant 5 % too long, 50 standard errors, unsaid.
+
+    Not told of a coarse encoder, nor of an axis at rest or slow.
+    """
+    T = np.arange(2000)
+    way = 20.0 * np.sin(2 * np.pi * T / 500.0)
+    read = np.round(way[T // every * every], 3)
+    found = sampling.repeated(Log("made", 1e-3 * T, 0.0 * T, read, resolution=1e-3), None)
+    assert [f"is new in one of {every} samples only" in f.what for f in found] == [True] * (every > 1)
+    assert not found or found[0].sample == every * (found[0].sample // every) + 1
+    assert not sampling.repeated(Log("made", 1e-3 * T, 0.0 * T, read, units={"position": "mm/s"}), None)
+    for still in (np.round(way / 0.2) * 0.2, np.where(T % 100 < 50, 0.0, way), np.round(way / 1e4, 3)):
+        assert not sampling.repeated(Log("made", 1e-3 * T, 0.0 * T, still, resolution=None), None)
+
+
 def test_ripples_of_a_filter_are_no_leaps_of_an_encoder(tmp_path: Path) -> None:
     """A filtered position has no noise beside which a leap could stand out; a ripple of 1 % of a step is none."""
     t = np.arange(3000) * 1e-3
@@ -322,5 +341,7 @@ def test_levels_that_are_each_held_are_no_limit(tmp_path: Path) -> None:
     held = np.repeat(levels, 100)
     columns = axis(6000) | {"voltage": held}
     assert "saturation" not in grave(read(tmp_path, columns))
+    ramp = np.maximum(np.linspace(-3.0, 6.0, 6000), 0.0)  # one way, after a rest
+    assert "saturation" not in grave(read(tmp_path, columns | {"voltage": ramp}))
     clipped = np.clip(held, -4.0, 4.0)
     assert "limited?" in grave(read(tmp_path, columns | {"voltage": clipped}))["saturation"].what

@@ -292,3 +292,7 @@ def test_signals_that_follow_each_other_in_rows_are_told_how_to_turn(tmp_path: P
     path.write_text("name,time [s],value\n" + "\n".join(rows) + "\n")
     with pytest.raises(InputError, match=r"pivot\(index='time', columns='name', values='value'\)"):
         read_log(path)
+    rows = (f"{name} 2024-05-01 12:00:{0.01 * k:09.6f} {k}" for k in range(200) for name in ("Axis1-PosAct", "Enc"))
+    path.write_text("\n".join(rows) + "\n")  # as EPICS's camonitor prints them
+    with pytest.raises(InputError, match=r"where 'column 1' says in each row which signal it holds"):
+        read_log(path)

@@ -250,6 +250,10 @@ def test_a_csp_log_has_its_reference_or_position_by_the_following_error(tmp_path
             {"command": "Motorspannung", "velocity": "Geschwindigkeit", "reference": "Sollgeschwindigkeit"},
         ),
         (
+            ("tempo", "référence [mm]", "posición [mm]", "Vérin [mm]", "tensão [V]"),  # an accent ends no word
+            {"command": "tensão", "position": "posición", "reference": "référence"},
+        ),
+        (
             ("Time (s)", "AccX (g)", "Torque (N·m)", "Motor Optical Speed (RPM)"),
             {"command": "Torque", "velocity": "Motor Optical Speed"},
         ),

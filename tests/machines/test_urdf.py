@@ -10,6 +10,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.machines import load_machine, machine_names
+from rds.machines.configuration import verdict
 from rds.machines.urdf import TIP, ZERO, machine_text_of_urdf, urdf_text
 
 WITH_LINKS = [name for name in machine_names() if load_machine(name).links]
@@ -91,6 +92,50 @@ def test_an_axis_that_is_askew(tmp_path: Path) -> None:
 def test_what_is_no_chain(text: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         machine_text_of_urdf(text, "own", "own.urdf")
+
+
+ARM = {  # joint: place in m and axis, as of an arm of six joints with a wrist
+    "a1": ("0 0 0.32", "0 0 1", 3.0),
+    "a2": ("0.04 0 0", "0 1 0", 1.9),
+    "a3": ("0 0 0.31", "0 -1 0", 2.4),
+    "a4": ("0 0 0.03", "-1 0 0", 3.3),
+    "a5": ("0.32 0 0", "0 -1 0", 2.2),
+    "a6": ("0.07 0 0", "-1 0 0", 6.28),
+}
+
+
+def arm() -> str:
+    """A URDF as those of robots are: behind the root also the frame `base`, behind the wrist `flange` and `tool0`."""
+    text, before = '<robot name="arm"><link name="base_link"/><link name="base"/><link name="flange"/>', "base_link"
+    for name, (place, axis, limit) in ARM.items():
+        text += f"""<link name="{name}"/><joint name="j{name}" type="revolute"><parent link="{before}"/>
+            <child link="{name}"/><origin xyz="{place}"/><axis xyz="{axis}"/>
+            <limit lower="{-limit}" upper="{limit}"/></joint>"""
+        before = name
+    for child, parent, turn in (("base", "base_link", "0"), ("tool0", "a6", "1.57079632679"), ("flange", "a6", "0")):
+        text += f"""<joint name="f{child}" type="fixed"><parent link="{parent}"/><child link="{child}"/>
+            <origin rpy="0 {turn} 0"/></joint>"""
+    return text + '<link name="tool0"/></robot>'
+
+
+def test_the_frames_of_a_robot_that_carry_nothing_are_no_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such a frame was a link that leads nowhere, which made nearly all published robots no machine."""
+    monkeypatch.setattr("rds.machines.configuration._POSES_NUMERIC", 2)
+    path = tmp_path / "arm.toml"
+    path.write_text(machine_text_of_urdf(arm(), "arm"), encoding="utf-8")
+    machine = load_machine(str(path))
+    assert "# Frames of the URDF that carry nothing are left out: base, flange.\n" in path.read_text(encoding="utf-8")
+    assert machine.tool is not None and machine.tool.link == "tool0"
+    assert verdict(machine).ok
+
+
+def test_an_arm_of_six_joints_reaches_what_it_reaches(tmp_path: Path) -> None:
+    """Most starts of the search end in another valley: poses within reach were called out of it, after a minute."""
+    path = tmp_path / "arm.toml"
+    path.write_text(machine_text_of_urdf(arm(), "arm"), encoding="utf-8")
+    kinematics = load_machine(str(path)).kinematics
+    poses = kinematics.forward(kinematics.random(15, seed=22)[:2])
+    assert not np.isnan(kinematics.inverse(poses)).any()
 
 
 def test_a_link_that_is_called_as_another_end_is_refused(tmp_path: Path) -> None:

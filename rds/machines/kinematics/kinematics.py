@@ -93,9 +93,8 @@ class Kinematics:
         Rows: velocity of the tip, then angular velocity of the tool; columns: per mm/s of a joint that shifts, per
         rad/s of one that turns. Its transpose brings a force (N) and torque (N·mm) at the tip to the joints.
         """
-        q = self.radians(joints)
-        directions, points = self.chain.axes(q)
-        tip = self.chain.forward(q)[:, None, :3, 3]
+        at, directions, points = self.chain.forward_and_axes(self.radians(joints))
+        tip = at[:, None, :3, 3]
         turns = np.array(self.turns)[None, :, None]
         linear = np.where(turns, np.cross(directions, tip - points), directions)
         return np.concatenate([linear, np.where(turns, directions, 0.0)], axis=2).swapaxes(1, 2)
