@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 _OVER = 1e-9  # of a limit, for rounding: mm, degrees
 _BLOCK = 4096  # poses at a time: what stays in the processor's cache
-_STARTS = 8
-_EVALUATIONS = 200
+_STARTS = 30
+_EVALUATIONS = 50  # a start that leads to a solution does so in some ten
 
 
 def inverse(kinematics: Kinematics, poses: np.ndarray, near: np.ndarray | None, bounds: np.ndarray) -> np.ndarray:
@@ -117,8 +117,8 @@ def _one(kinematics: Kinematics, pose: np.ndarray, near: np.ndarray, bounds: np.
     for start in (first, *others):
         inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
         found = least_squares(
-            miss, inside, slope, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=_EVALUATIONS,
-            x_scale=np.where(kinematics.turns, 10.0, LENGTH),
+            miss, inside, slope, bounds=(low, high), method="dogbox", xtol=1e-15, ftol=1e-15, gtol=1e-15,
+            max_nfev=_EVALUATIONS, x_scale=np.where(kinematics.turns, 10.0, LENGTH),
         ).x  # fmt: skip
         if met(found):
             return np.asarray(found)
