@@ -18,6 +18,9 @@ from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.core.quantities import Quantity
 
+_OFF = 0.01  # of the fastest pole: how far placed poles may lie from those asked for; the rounding of near-deadbeat
+_OFF_OF_OWN = 1e-4  # ones is in proportion to the system's own
+
 
 def read_poles(poles: Any, count: int | None = None, owner: str = "design") -> list[complex]:
     """Poles as complex numbers, 1/s, from complex or real numbers or [real, imaginary] pairs.
@@ -62,10 +65,15 @@ def _place(A: np.ndarray, B: np.ndarray, poles: Sequence[complex]) -> np.ndarray
         import control
 
     try:
-        gains = control.place(A, B, poles)
-        return np.asarray(gains, dtype=float).reshape(B.shape[1], A.shape[0])
+        gains = np.asarray(control.place(A, B, poles), dtype=float).reshape(B.shape[1], A.shape[0])
     except (ValueError, np.linalg.LinAlgError, control.ControlDimension) as error:
         raise _unplaced(poles, str(error)) from error
+    # gains of a system that is nearly not reachable are so large that rounding puts the poles anywhere
+    apart = np.abs(np.linalg.eigvals(A - B @ gains)[:, None] - np.asarray(poles))
+    most = max(_OFF * np.abs(poles).max(), _OFF_OF_OWN * np.abs(np.linalg.eigvals(A)).max())
+    if not max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= most:
+        raise _unplaced(poles, "the system is nearly not reachable (of an observer: not observable)")
+    return gains
 
 
 def _ackermann(A: np.ndarray, B: np.ndarray, poles: Sequence[complex]) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 
 from rds.controllers.observer import held_axis
 from rds.core.extras import needed_for
+from rds.core.integrate import gramian
 from rds.core.types import Reference
 
 _ROUNDING = 1e-9  # of a sample
@@ -103,7 +104,7 @@ def designed(tau: float, K: float, T: float, limit: float, options: Mapping[str,
     A, B = np.array([[0.0, 1.0], [0.0, -1.0 / tau]]), np.array([[0.0], [K / tau]])
     cost = np.diag([options["error"] ** -2, 0.0, options["voltage"] ** -2])
     augmented = np.block([[A, B], [np.zeros((1, 3))]])
-    weight = _integral(augmented.T, cost, T)  # of [x, u] over a sample, u constant
+    weight = gramian(augmented.T, cost, T)  # of [x, u] over a sample, u constant
     a12, a22, b1, b2 = over = held_axis(tau, K, T)
     Phi, Gamma = np.array([[1.0, a12], [0.0, a22]]), np.array([[b1], [b2]])
     Q, S, R = weight[:2, :2], weight[:2, 2:], weight[2:, 2:]
@@ -113,7 +114,7 @@ def designed(tau: float, K: float, T: float, limit: float, options: Mapping[str,
     intensity = np.zeros((3, 3))
     intensity[:2, :2] = options["disturbance"] ** 2 * B @ B.T
     intensity[2, 2] = options["drift"] ** 2
-    process = _integral(augmented, intensity, T)
+    process = gramian(augmented, intensity, T)
     n = 3 if has_drift else 2
     step, seen = np.block([[Phi, Gamma], [np.zeros((1, 2)), np.ones((1, 1))]])[:n, :n], np.eye(1, n)
     jitter = 1e-12 * np.eye(n) * max(np.trace(process), 1e-12)  # so that the equation has a solution without noise
@@ -143,16 +144,6 @@ def _moved(x: Sequence[float], u: float, over: Held) -> Triple:
     a12, a22, b1, b2 = over
     drive = u + x[2]
     return x[0] + a12 * x[1] + b1 * drive, a22 * x[1] + b2 * drive, x[2]
-
-
-def _integral(A: np.ndarray, Q: np.ndarray, time: float) -> np.ndarray:
-    """∫ e^(As) Q e^(A's) ds over 0 to `time` (Van Loan)."""
-    from scipy.linalg import expm
-
-    n = len(A)
-    big = expm(np.block([[-A, Q], [np.zeros((n, n)), A.T]]) * time)
-    found: np.ndarray = big[n:, n:].T @ big[:n, n:]
-    return 0.5 * (found + found.T)
 
 
 def _six(P: np.ndarray) -> Six:

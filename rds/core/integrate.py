@@ -1,12 +1,13 @@
-"""Fixed-step integration of a differential equation whose input is held.
+"""Fixed-step integration of a differential equation whose input is held; the integral behind costs and covariances.
 
-Our own, because `solve_ivp` chooses its steps, and stalls where friction reverses; equal steps cost and err the
-same in every sample, so that a run repeats to the bit.
+The steps are our own, because `solve_ivp` chooses its steps, and stalls where friction reverses; equal steps cost and
+err the same in every sample, so that a run repeats to the bit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import ceil, log2
 from typing import Any
 
 import numpy as np
@@ -37,3 +38,22 @@ def rk4(
         k4 = derivatives(now + h, x + h * k3, u, params)
         x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
     return x
+
+
+def gramian(A: np.ndarray, Q: np.ndarray, time: float) -> np.ndarray:
+    """∫ e^(As) Q e^(A's) ds over 0 to `time` s, for a symmetric Q (C. Van Loan, IEEE AC-23 (1978) 395-404).
+
+    His exponential holds e^(-At) too, which drowns the rest where a mode decays within `time`: so it is taken over a
+    part in which none does, and doubled.
+    """
+    from scipy.linalg import expm
+
+    n, doublings = len(A), ceil(log2(max(float(np.linalg.norm(A, 2)) * time, 1.0)))
+    big = expm(np.block([[-A, Q], [np.zeros((n, n)), A.T]]) * (time / 2**doublings))
+    step = big[n:, n:].T
+    found = step @ big[:n, n:]
+    for _ in range(doublings):
+        found = found + step @ found @ step.T
+        step = step @ step
+    symmetric: np.ndarray = 0.5 * (found + found.T)
+    return symmetric

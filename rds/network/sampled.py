@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rds.core.extras import needed_for
+from rds.core.integrate import gramian
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,8 @@ def part(plant: Plant, time: float) -> Part:
     whole[:n, :n], whole[:n, n:] = plant.A, plant.B.reshape(n, 1)
     step = expm(whole * time)
     Phi, Gamma = step[:n, :n], step[:n, n:]
-    V = _gramian(plant.A, plant.R, time)
-    W = _gramian(whole.T, plant.Q, time)
+    V = gramian(plant.A, plant.R, time)
+    W = gramian(whole.T, plant.Q, time)
     # the noise that comes in at s costs tr(Q ∫₀^(t-s) e^(Ar) R e^(A'r) dr): the integral of its own gramian
     return Part(Phi, Gamma, V, W, _noise_cost(plant, time))
 
@@ -72,18 +73,6 @@ def response(plant: Plant, time: float) -> tuple[np.ndarray, np.ndarray]:
     whole[:n, :n], whole[:n, n] = plant.A, plant.B.reshape(n)
     step = expm(whole * time)
     return step[:n, :n], step[:n, n]
-
-
-def _gramian(A: np.ndarray, Q: np.ndarray, time: float) -> np.ndarray:
-    """∫ e^(As) Q e^(A's) ds over 0 to `time`."""
-    from scipy.linalg import expm
-
-    n = len(A)
-    block = np.zeros((2 * n, 2 * n))
-    block[:n, :n], block[:n, n:], block[n:, n:] = -A, Q, A.T
-    big = expm(block * time)
-    found: np.ndarray = big[n:, n:].T @ big[:n, n:]
-    return 0.5 * (found + found.T)
 
 
 def _noise_cost(plant: Plant, time: float) -> float:

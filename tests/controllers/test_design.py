@@ -171,6 +171,7 @@ def test_reduced_order_observer_of_a_discrete_system():
     built = reduced_order_observer(sys, [0.5, 0.6, 0.7])
     assert built.dt == 0.02
     assert np.abs(_estimation_errors(sys, built, 2.0)[:, -1]).max() < 1e-6
+    assert np.abs(reduced_order_observer(sys, [0.0, 1e-5, -1e-5]).poles()).max() < 1e-3  # nearly deadbeat
 
 
 def test_reduced_order_observer_of_the_axis_is_equation_9():
@@ -186,6 +187,13 @@ def test_observer_without_unmeasured_states_hands_the_outputs_through():
     sys = control.ss(-np.eye(2), np.ones((2, 1)), [[2.0, 0], [0, 4.0]], 0)
     built = reduced_order_observer(sys, [])
     np.testing.assert_allclose(built.D, [[0, 0.5, 0], [0, 0, 0.25]])
+
+
+def test_poles_that_rounding_puts_elsewhere_are_refused():
+    """Modes at almost one place: python-control's gains of some 1e8 put a pole of the observer at +9.9 and the like."""
+    sys = control.ss(np.diag([-1.0, -1.0 - 1e-6, -1.0 - 2e-6, -1.0 - 3e-6, -2.0]), np.ones((5, 1)), np.ones((1, 5)), 0)
+    with pytest.raises(InputError, match="cannot be placed: the system is nearly not reachable"):
+        reduced_order_observer(sys, [-6, -7, -9, -18])
 
 
 @pytest.mark.parametrize(

@@ -137,6 +137,23 @@ def test_a_chain_without_closed_form_is_solved_numerically(tmp_path: Path) -> No
     np.testing.assert_allclose(kinematics.forward(kinematics.inverse(poses))[:, :3, 3], poses[:, :3, 3], atol=1e-5)
 
 
+def test_an_arm_of_five_turning_joints_finds_the_way_to_where_it_was(tmp_path: Path) -> None:
+    """Far from where the search begins, and beside limits of the joints."""
+    links = (
+        link(name="swivel", axis="A1", joint="ZA", offset=[0.0, 0.0, 300.0], limits=[-170.0, 170.0])
+        + link(name="lower", axis="A2", joint="YA", offset=[75.0, 0.0, 0.0], limits=[-60.0, 140.0])
+        + link(name="upper", axis="A3", joint="YA", offset=[0.0, 0.0, 300.0], limits=[-140.0, 180.0])
+        + link(name="wrist", axis="A4", joint="YA", offset=[320.0, 0.0, 75.0], limits=[-120.0, 120.0])
+        + link(name="hand", axis="A5", joint="ZA", offset=[80.0, 0.0, 0.0])
+        + '[tool]\nlink = "hand"\noffset = [0.0, 0.0, 30.0]\nangles = [0.0, 90.0, 0.0]\n'
+    )
+    kinematics = machine(tmp_path, ["A1", "A2", "A3", "A4", "A5"], links).kinematics
+    poses = kinematics.forward(kinematics.random(30, seed=8)[[0, 29]])
+    for wanted in poses:
+        found = kinematics.forward(kinematics.inverse(wanted))
+        np.testing.assert_allclose(found[:3, 2:], wanted[:3, 2:], atol=1e-5)
+
+
 def test_what_cannot_be_reached_is_nan() -> None:
     mill = MACHINES["mrm-mill"].kinematics
     assert np.isnan(mill.inverse(pose([[0.0, 0.0, 0.0]], (0.0, 0.1, 1.0)))).all()  # it cannot tilt

@@ -175,6 +175,8 @@ def test_point_to_point_refuses_what_cannot_be() -> None:
             point_to_point(start, start, start, start, start, 1e-3)
     with pytest.raises(InputError, match="beyond ruckig's arithmetic"):
         point_to_point((0,), (1e9,), (5e8,), (5e9,), (5e11,), 0.01)
+    with pytest.raises(InputError, match="beyond ruckig's arithmetic"):  # 13 hours
+        point_to_point((0, 0), (1, 1), (1, 1), (1000, 1000), (20, 20), 0.01, start_acceleration=[300, 0])
     moving = point_to_point((0,), (5,), (10,), (100,), (1e4,), T=1e-3, start_velocity=[5.0])
     assert moving.velocity[0, 0] == 5.0 and moving.position[-1, 0] == 5.0
     with pytest.raises(InputError, match=r"end_velocity = \(0.0, 1.5\) must be 2 finite numbers within \(1, 1\)"):

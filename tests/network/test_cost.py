@@ -149,3 +149,11 @@ def test_a_part_of_a_sample_is_what_quadrature_gives() -> None:
     assert found == pytest.approx(V, rel=1e-3, abs=1e-15)
     w = sum(np.trace(AXIS.Q[:2, :2] @ piece.V) for piece in pieces) * 0.004 / len(pieces)
     assert over.w == pytest.approx(w, rel=1e-3)
+
+
+def test_a_sample_of_many_time_constants_is_what_the_closed_form_gives() -> None:
+    """τ v' + v = w over T = 40 τ; the exponential of it all at once gave −10¹⁴ mm² for the variance of the position."""
+    tau, T = 0.001, 0.04
+    axis = Plant(np.array([[0.0, 1.0], [0.0, -1 / tau]]), np.zeros(2), np.array([[1.0, 0.0]]), np.diag([0.0, tau**-2]))
+    expected = [[T - 1.5 * tau, 0.5], [0.5, 0.5 / tau]]  # e^(-40) is nothing
+    np.testing.assert_allclose(part(axis, T).V, expected, rtol=1e-9)

@@ -150,6 +150,18 @@ def test_what_is_not_done_to_an_object_is_told(drawn: Read, attribute: str, told
 
 
 @pytest.mark.parametrize(
+    ("sheet", "told"),
+    [
+        ("#a { transform: scale(2) }", "a transformation by CSS"),
+        ("path.cut, g path, .cut.old { display: none }", "the style sheet's rule for '.cut.old' that hides"),
+    ],
+)
+def test_what_a_style_sheet_does_and_is_not_done_is_told(drawn: Read, sheet: str, told: str) -> None:
+    notes = drawn(f'<style>{sheet} path[id] {{ fill: red }}</style><g id="a">{BOX}</g>').notes
+    assert len(notes) == sheet.count(",") + 1 and told in notes[-1]
+
+
+@pytest.mark.parametrize(
     "inner", ['<circle r="1e300"/>', '<path d="M0 0 A 1e20 1e20 0 0 1 5 5"/>', '<path d="M0 0L1e999 5"/>']
 )
 def test_numbers_too_large_for_a_drawing_are_refused(tmp_path: Path, inner: str) -> None:

@@ -84,7 +84,7 @@ def point_to_point(
     for _ in range(_ATTEMPTS):
         try:
             outcome = ruckig.Ruckig(n).calculate(asked, found)
-        except ruckig.RuckigError:  # numbers too far apart for its arithmetic
+        except (ruckig.RuckigError, ValueError):  # it has no name for one, -101
             outcome = "beyond ruckig's arithmetic"
         if outcome not in (ruckig.Result.Working, ruckig.Result.Finished):
             raise InputError(

@@ -32,6 +32,8 @@ _PASSED_OVER = {
 _XLINK = "{http://www.w3.org/1999/xlink}"
 _ASPECT = re.compile(r"x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?")
 _SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}  # of the room that is left, before the drawing
+_RULED = ("display", "visibility", "transform")  # what is looked for in style sheets
+_SIMPLE = re.compile(r"[.#]?[\w-]+")  # selectors that are followed: of an element's name, class or id
 _NOT_DRAWN = ("defs", "metadata", "clipPath", "mask", "marker", "pattern", "symbol", "style", "title", "desc")
 DEEPEST = 100  # groups within one another
 Matrix = np.ndarray  # 2 × 3
@@ -114,8 +116,8 @@ def _length(text: str | None, name: str, per_unit: float | None = None, whole: f
     return float(match[1]) * (1.0 if match[2] in ("", "px") else _MM[match[2]] / _MM["px"])
 
 
-def _hiding_rules(root: ElementTree.Element) -> dict[str, dict[str, str]]:
-    """What style sheets in the file say of display and visibility: by `.class`, `#id` or name of the element."""
+def _rules(root: ElementTree.Element) -> dict[str, dict[str, str]]:
+    """What style sheets in the file say of display, visibility and transform, by selector."""
     found: dict[str, dict[str, str]] = {}
     for element in root.iter():
         if _tag(element) == "style":
@@ -123,7 +125,7 @@ def _hiding_rules(root: ElementTree.Element) -> dict[str, dict[str, str]]:
             first, *commented = (element.text or "").split("/*")
             for rule in (first + "".join(text.partition("*/")[2] for text in commented)).split("}"):
                 selectors, _, body = rule.rpartition("{")
-                said = {key: value for key, value in _declared(body).items() if key in ("display", "visibility")}
+                said = {key: value for key, value in _declared(body).items() if key in _RULED}
                 for selector in selectors.rpartition("{")[2].split(",") if said else ():
                     found.setdefault(selector.strip(), {}).update(said)
     return found
@@ -139,23 +141,35 @@ class _Reader:
         self.name = name
         self.curves: list[Curve] = []
         self.passed_over: dict[str, int] = {}
-        self.rules = _hiding_rules(root)
+        self.rules = _rules(root)
         self.by_id = {element.get("id"): element for element in root.iter() if element.get("id")}
         self.taken = 0  # points so far; an element counts as one, a clone as fifty
         self.cloned: list[ElementTree.Element] = []  # what the clones show that are being drawn
+        for selector in self.rules:
+            if not _SIMPLE.fullmatch(selector):
+                self._pass_over(
+                    f"the style sheet's rule for {selector[:60]!r} that hides, shows or transforms; "
+                    "write that at the objects"
+                )
 
     def is_shown(self, element: ElementTree.Element, visible: bool) -> bool | None:
         """Whether an element is visible, as what it is in is unless it says otherwise; None: nor anything within it."""
         said = {key: element.get(key, "") for key in ("display", "visibility") if element.get(key)}
-        for selector in (_tag(element), *(f".{word}" for word in element.get("class", "").split())):
-            said |= self.rules.get(selector, {})
-        said |= self.rules.get(f"#{element.get('id')}", {})
+        said |= self._ruled(element)
         style = _declared(element.get("style", ""))
         said |= {key: value for key, value in style.items() if key in said or key in ("display", "visibility")}
         if said.get("display") == "none":
             return None
         visibility = said.get("visibility", "inherit")
         return visible if visibility == "inherit" else visibility == "visible"
+
+    def _ruled(self, element: ElementTree.Element) -> dict[str, str]:
+        """What the style sheets say of an element."""
+        classes = (f".{word}" for word in element.get("class", "").split())
+        said: dict[str, str] = {}
+        for selector in (_tag(element), *classes, f"#{element.get('id')}"):
+            said |= self.rules.get(selector, {})
+        return said
 
     def walk(
         self,
@@ -182,7 +196,8 @@ class _Reader:
         style = _declared(element.get("style", ""))
         if any((style.get(key) or element.get(key) or "none") != "none" for key in ("clip-path", "mask")):
             self._pass_over("a clip or mask: its object is drawn whole (Object > Clip > Release, Path > Intersection)")
-        if style.get("transform", "none") != "none" or element.get("transform-origin"):
+        by_style = style.get("transform", self._ruled(element).get("transform", "none"))
+        if by_style != "none" or element.get("transform-origin"):
             self._pass_over(
                 "a transformation by CSS (transform-origin, or transform in a style); write it as transform="
             )
