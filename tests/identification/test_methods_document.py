@@ -1,4 +1,4 @@
-"""docs/identification-methods.md: its Python runs, its settings are those of the code, its map is read."""
+"""docs/identification-methods.md: its Python runs, its settings are those of the code."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from rds.identification.fit.inverse_dynamics import OPTIONS
-from rds.identification.logs.map import LogMap
 from rds.identification.structures.motion_form import _FORMS
 
 TEXT = (Path(__file__).parents[2] / "docs" / "identification-methods.md").read_text(encoding="utf-8")
@@ -30,9 +29,3 @@ def test_every_setting_and_structure_is_named() -> None:
     for name, options in _FORMS:
         assert f"`{name}`" in TEXT
         assert all(f"`{option}`" in TEXT for option in options)
-
-
-def test_the_map_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "DATA_EMPS.mat.map.toml"
-    path.write_text(re.findall(r"```toml\n(.*?)```", TEXT, re.S)[0])
-    assert LogMap.read(path) is not None
