@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from rds.identification.fit.inverse_dynamics import OPTIONS
+from rds.identification.logs.map import LogMap
 from rds.identification.structures.motion_form import _FORMS
 
 TEXT = (Path(__file__).parents[2] / "docs" / "identification-methods.md").read_text(encoding="utf-8")
@@ -29,3 +30,10 @@ def test_every_setting_and_structure_is_named() -> None:
     for name, options in _FORMS:
         assert f"`{name}`" in TEXT
         assert all(f"`{option}`" in TEXT for option in options)
+
+
+def test_the_map_of_the_emps_is_read(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "data.md").read_text(encoding="utf-8")
+    path = tmp_path / "DATA_EMPS.mat.map.toml"
+    path.write_text(re.findall(r"```toml file=DATA_EMPS.mat.map.toml\n(.*?)```", text, re.S)[0])
+    assert "EMPS" in LogMap.read(path).axes
