@@ -29,7 +29,9 @@ def by_group(intake: Intake, listed: ClassList) -> Intake:
     of_group: dict[str, list[HandedIn]] = {name: [] for name in groups}
     for row, member in zip(intake.rows, members, strict=True):
         if member is not None and len(who := of_member[member.student]) > 1:
-            reason = f"{', '.join(who)} are one student of the class list, {member.student}; keep one of the submissions"
+            reason = (
+                f"{', '.join(who)} are one student of the class list, {member.student}; keep one of the submissions"
+            )
             row = replace(row, status=Status.REFUSED, reason=reason)
         name = row.student if row.student in groups else member.group if member is not None else ""
         if name:
