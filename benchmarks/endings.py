@@ -37,7 +37,7 @@ _ABOUT = """Runs that end badly, in real processes; `python -m benchmarks.ending
 page. Each is a run of three axes for two seconds at 100 Hz, by `rds run`; what is done to it is done at a random
 moment, most often while it starts or runs. *Right* means: the command ends within a minute with an exit code of
 [the documents](commands.md), the record opens or stderr says why there is none, and no process and no shared memory is
-left. *Hangs* means: it had not ended after a minute ([why](../benchmarks/README.md#verdicts-of-timing-under-load)).
+left. *Hangs* means: it had not ended after a minute (why: `benchmarks/README.md`).
 Ctrl-C before Python has loaded the first line of RDS is answered by Python alone. The full disk is a limit on the size
 of files, which every process of the run has.
 """.splitlines()
