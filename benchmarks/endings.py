@@ -37,8 +37,9 @@ _ABOUT = """Runs that end badly, in real processes; `python -m benchmarks.ending
 page. Each is a run of three axes for two seconds at 100 Hz, by `rds run`; what is done to it is done at a random
 moment, most often while it starts or runs. *Right* means: the command ends within a minute with an exit code of
 [the documents](commands.md), the record opens or stderr says why there is none, and no process and no shared memory is
-left. Ctrl-C before Python has loaded the first line of our program is Python's own affair. A disk without room is a
-limit on the size of files, which every process of the run has.
+left. *Hangs* means: it had not ended after a minute (why: `benchmarks/README.md`).
+Ctrl-C before Python has loaded the first line of RDS is answered by Python alone. The full disk is a limit on the size
+of files, which every process of the run has.
 """.splitlines()
 PATIENCE = 60.0  # s for a command to end
 LINGER = 20.0  # s for its hub and its machine to notice that nobody needs them

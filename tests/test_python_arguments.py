@@ -232,7 +232,7 @@ def test_a_command_takes_the_place_of_its_own_file_only(
     words = [*command.split(), name]
     (here / name).write_text(theirs)
     refused = CliRunner().invoke(app, words)
-    assert refused.exit_code == 2 and f"{name}: there is another file already" in refused.stderr
+    assert refused.exit_code == 2 and f"{name}: is there already, and is no" in refused.stderr
     assert (here / name).read_text() == theirs
     if "loop.toml" in words[:-1]:
         words[-1] = "other.toml"

@@ -18,7 +18,10 @@ import numpy as np
 import pictures
 import pytest
 from documents import ROOT, Block, blocks, environment, is_real_time, run, save, shorten
+from typer.main import get_command
 from waiting import wait_for
+
+from rds.cli.main import app
 
 README = blocks("README.md")
 BLOCKS = [*README, *blocks("docs/first-axis.md")]
@@ -98,6 +101,16 @@ def test_make_targets_exist() -> None:
     targets = [command.split()[1] for command in targets if command.startswith("make ")]
     assert targets == ["setup", "demo", "test"]
     assert all(re.search(rf"^{target}:.*##", makefile, re.MULTILINE) for target in targets)
+
+
+def test_the_page_of_commands_names_every_command() -> None:
+    rows = [row for row in (ROOT / "docs/commands.md").read_text(encoding="utf-8").splitlines() if "`rds " in row]
+    missing = []
+    for name, command in get_command(app).commands.items():  # type: ignore[attr-defined]
+        named = " ".join(row for row in rows if f"`rds {name}" in row)
+        words = list(getattr(command, "commands", [])) or [name]
+        missing += [f"{name} {word}" for word in words if not re.search(rf"[ `]{word}[ `]", named)]
+    assert not missing
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)

@@ -127,7 +127,7 @@ def chosen_bus(
     if bitrate is not None and where == SERIAL and dialect in (None, "dcs"):
         from rds.core.errors import InputError
 
-        raise InputError("--bitrate is for CAN, and this is a serial line; say --baud, or leave it out")
+        raise InputError("--bitrate is for CAN, and this is a serial line; give --baud instead, or leave it out")
     if where == SERIAL and place is None and dialect in (None, "dcs"):
         place = SERIAL_MACHINE if experiment is None else _channel_of(experiment)
     if where != BUILTIN:

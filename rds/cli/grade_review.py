@@ -74,7 +74,7 @@ def review(
         if final and not any(each.kind is Kind.POINTS for each in said):
             raise InputError("--final is about points; give --points or --marks")
         if not said and (student or section or criterion):
-            raise InputError("nothing is said of it; give --points, --comment, --excuse or --extend-days")
+            raise InputError("there is nothing to enter; give --points, --comment, --excuse or --extend-days")
         if said:
             entries, finished = say(out, said)
         else:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 Program = Annotated[Path, typer.Argument(help="The part program (RS274NGC, as LinuxCNC reads it).", metavar="FILE")]
 MachineName = Annotated[str, typer.Option("--machine", help="A machine's name, or the path of its TOML file.")]
-Tools = Annotated[Path | None, typer.Option(help="Tool table, as LinuxCNC keeps it, lengths in mm.")]
+Tools = Annotated[Path | None, typer.Option(help="Tool table as LinuxCNC keeps it, in mm, or tool library (.toml).")]
 Parameters = Annotated[Path | None, typer.Option(help="Parameter file, as LinuxCNC keeps it (offsets, #parameters).")]
 With = Annotated[
     list[str] | None,

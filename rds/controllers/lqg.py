@@ -87,7 +87,8 @@ def make(
     if axis.spindle:
         raise InputError(f"{owner} drives position axes; use the controller 'pid' for a spindle")
     if given["delay"] > _LONGEST * T:
-        raise InputError(f"{owner}: delay = {given['delay']:g} s is more than {_LONGEST} samples of {T:g} s")
+        what = f"{owner}: delay = {given['delay']:g} s is more than {_LONGEST} samples of {T:g} s"
+        raise InputError(f"{what}; choose a shorter delay or a longer sample period")
     design = designed(axis.tau, axis.K, T, converter_range, given)
     start = (0.0, 0.0, 0.0, 0.0, 0.0, *design.covariance, *[0.0] * (REMEMBERED + design.whole + 2))
     params = {**given, "gains": list(design.gain), "design": design}

@@ -75,7 +75,8 @@ def make(
         raise InputError(f"{owner} drives position axes; use the controller 'pid' for a spindle")
     delay, of_inner = values["delay"], values["options"] or {}
     if delay > _LONGEST * T:
-        raise InputError(f"{owner}: delay = {delay:g} s is more than {_LONGEST} samples of {T:g} s")
+        what = f"{owner}: delay = {delay:g} s is more than {_LONGEST} samples of {T:g} s"
+        raise InputError(f"{what}; choose a shorter delay or a longer sample period")
     if not isinstance(of_inner, Mapping):
         raise InputError(f"{owner}: options = {of_inner!r} must be a table of the inner law's options")
     inner = _INNER[values["law"]].make(axis_model, T, converter_range, unit=unit, **of_inner)

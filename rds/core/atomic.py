@@ -63,7 +63,7 @@ def keep_another(path: Path, mark: str, what: str) -> None:
     except OSError:  # there is none, or writing tells
         return
     if head.strip() and mark.encode() not in head:
-        raise InputError(f"there is another file already, no {what}; name another one, or remove it", str(path))
+        raise InputError(f"is there already, and is no {what}; choose another name, or remove it", str(path))
 
 
 def _sync_directory(directory: Path) -> None:

@@ -47,7 +47,8 @@ class Job:
     def active(self) -> Run:
         """Its run, whose live values can be set. InputError where it does not run."""
         if self.state not in (STARTING, RUNNING) or self.run is None or not self.run.ready(_BEGIN) or self.run.done:
-            raise InputError(f"job {self.number} does not run: it is {self.state}")
+            remedy = {LOADED: 'begin it with "do": "run"', OVER: "load its file again"}.get(self.state, "wait")
+            raise InputError(f"job {self.number} does not run: it is {self.state}; {remedy}")
         return self.run
 
     def program(self) -> ProgramRun:

@@ -289,7 +289,7 @@ def _axis(name: str, tables: TomlTable) -> Axis:
     )
     if made.power is not None and not made.is_spindle:
         raise InputError(
-            f"power is that of a spindle's motor, and {name} is none (unit {made.unit!r}); leave it away", table.path
+            f"power is that of a spindle's motor, and {name} is none (unit {made.unit!r}); leave it out", table.path
         )
     for each in (module, table):
         each.done()

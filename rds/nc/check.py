@@ -98,7 +98,7 @@ def check_program(
     header = describe(program, machine, setup)
     place = beside(program)
     if place.exists() and not is_ours(place):
-        raise InputError("is where the compiled program would go, and is none; rename or move it", str(place))
+        raise InputError("is no compiled program, and one would be written here; rename or move it", str(place))
     validator = validator_of(program, machine, setup)
     items = followed(setup.interpret(program, validator.warn), program, progress)
     blocks = validator.watch(watched(items, validator, setup, validator.report))

@@ -45,7 +45,7 @@ def read_trace(path: str | Path) -> dict[str, np.ndarray]:
         raise InputError("it names a column twice", f"{path}:{lines[0][0]}")
     rows = [_row(line, names, f"{path}:{number}") for number, line in lines[1:] if line.strip() or len(names) == 1]
     if not rows:
-        raise InputError("it has no rows of delays below its heading", str(path))
+        raise InputError("it has no rows of delays below its heading; measure again, for longer", str(path))
     return dict(zip(names, np.array(rows).T, strict=True))
 
 

@@ -32,7 +32,8 @@ def read_rows(file: str | Path) -> np.ndarray:
             continue
         row = _row(cells, place)
         if rows and len(row) != len(rows[0]):
-            raise InputError(f"this row has {len(row)} columns, the ones before it {len(rows[0])}", place)
+            what = f"this row has {len(row)} columns, the ones before it {len(rows[0])}"
+            raise InputError(f"{what}; repair or remove it", place)
         if rows and row[0] <= rows[-1][0]:
             raise InputError(f"time {row[0]:g} s does not come after {rows[-1][0]:g} s; times must increase", place)
         numbers.append(number)

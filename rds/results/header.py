@@ -51,7 +51,8 @@ def parse(text: str | bytes) -> dict[str, Any]:
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise InputError(f"its description is not that of a result (format is not {FORMAT!r})")
     if not isinstance(header.get("version"), int) or header["version"] > VERSION:
-        raise InputError(f"it is in version {header.get('version')!r} of the format; this rds reads up to {VERSION}")
+        what = f"it is in version {header.get('version')!r} of the format, and this rds reads up to {VERSION}"
+        raise InputError(f"{what}; open it with a newer rds")
     columns = header.get("columns")
     if not isinstance(columns, list) or not all(_is_column(entry) for entry in columns):
         raise InputError("its description lists no columns with name, unit and type; save the result again")

@@ -33,7 +33,7 @@ def signals(result: Result, axis: str | None = None) -> Picture:
     of = {name: found for name, found in of.items() if found}
     if not of:
         raise InputError(
-            "no controller of this run told signals; declare them beside params, as in "
+            "no controller of this run has signals; declare them beside params, as in "
             '`signals = {"velocity": "mm/s"}`, and return their values as the third of control()'
         )
     rows = list(dict.fromkeys(row for name in of for row in _rows(result, name)))

@@ -281,5 +281,5 @@ def test_the_picture_holds_the_estimate_against_the_true_velocity():
     assert np.array_equal(drawn["true"], result["X_plant_velocity"])
     assert np.array_equal(drawn["estimate"], result["X_velocity"])
     assert np.array_equal(below.get_lines()[0].get_ydata(), estimate_error(result, "X"))
-    with pytest.raises(rds.InputError, match="no controller of this run told signals"):
+    with pytest.raises(rds.InputError, match="no controller of this run has signals"):
         experiment({"name": "p"}).run("simulation").plot_signals()

@@ -1,4 +1,4 @@
-"""docs/identification-methods.md: its Python runs, its settings are those of the code, its map is read."""
+"""docs/identification-methods.md: its Python runs, its settings are those of the code."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def test_every_setting_and_structure_is_named() -> None:
         assert all(f"`{option}`" in TEXT for option in options)
 
 
-def test_the_map_is_read(tmp_path: Path) -> None:
+def test_the_map_of_the_emps_is_read(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "data.md").read_text(encoding="utf-8")
     path = tmp_path / "DATA_EMPS.mat.map.toml"
-    path.write_text(re.findall(r"```toml\n(.*?)```", TEXT, re.S)[0])
-    assert LogMap.read(path) is not None
+    path.write_text(re.findall(r"```toml file=DATA_EMPS.mat.map.toml\n(.*?)```", text, re.S)[0])
+    assert "EMPS" in LogMap.read(path).axes

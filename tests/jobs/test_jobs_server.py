@@ -174,7 +174,7 @@ def test_a_program_is_held_resumed_and_stopped_by_two_clients(serve: Serve) -> N
     assert two.ask(do="stop", job=1)["ok"]
     assert two.until_over(1)["ending"] == "stopped"
     assert two.until_over(2)["ending"] == "done"
-    assert "job 2 does not run: it is over" in two.ask(do="hold", job=2)["error"]
+    assert "job 2 does not run: it is over; load its file again" in two.ask(do="hold", job=2)["error"]
 
 
 @pytest.mark.realtime

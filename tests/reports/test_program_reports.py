@@ -76,7 +76,7 @@ def test_the_return_error_is_where_it_ends_less_where_it_began(tmp_path: Path) -
     assert table.column("together [µm]") == pytest.approx([50.0])
     assert table.column("return error Y [µm]") == pytest.approx([-40.0])
     assert report.findings == ["A: it comes back to 50.0 µm, more than the 5 µm allowed."]
-    with pytest.raises(InputError, match="does not come back to its start: it ends X 70, Y 20, Z 0 mm from it"):
+    with pytest.raises(InputError, match="does not come back to its start: it ends X 70, Y 20, Z 0 mm from it; end"):
         make_report("return-error", files(tmp_path, [RAPID], rows[:2]))
 
 

@@ -116,7 +116,7 @@ def test_a_trapezoidal_profile_belongs_together_though_its_acceleration_jumps(tm
         ("0,1\n1,inf\n", 2, "finite"),
         ("0,1\n0,2\n", 2, "must increase"),
         ("0,1\n2,1\n1,2\n", 3, "must increase"),
-        ("0,1\n1,2,3,4\n", 2, "4 columns, the ones before it 2"),
+        ("0,1\n1,2,3,4\n", 2, "4 columns, the ones before it 2; repair or remove it"),
         ("0,1,2\n", 1, "3 columns; it needs time,value or"),
         ("0;1\n1;2\n", 1, "1 column; it needs"),
         ("value,time\n1,0\n", 1, "the first column is 'value'"),

@@ -37,7 +37,7 @@ def _span(text: str) -> Span:
     first, extended = _identifier(first_text, text)
     last, also = _identifier(last_text, text) if dash else (first, extended)
     if last < first:
-        raise InputError(f"the range {text!r} ends before it begins; turn it round")
+        raise InputError(f"the range {text!r} ends before it begins; swap its ends")
     return first, last, extended or also
 
 

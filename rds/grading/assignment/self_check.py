@@ -83,7 +83,9 @@ def self_check(assignment: Assignment, file: Path, student: str, pool: Opener) -
         if (criterion.is_visible or is_blind) and (pool.counts_work or COUNTS not in criterion.needs)
     ]
     if not tried:
-        raise InputError("no criterion of it can be tried here", str(assignment.folder))
+        raise InputError(
+            "no criterion of it can be tried here: all are hidden, or need the sandbox", str(assignment.folder)
+        )
     seen = [criterion for criterion in tried if criterion.is_visible]
     others = [criterion for criterion in tried if not criterion.is_visible]
     with as_python(assignment, file) as path:

@@ -94,7 +94,7 @@ def frequency_response(log: Log, is_rate: bool | None = None, period: float | No
     if not np.ptp(u) > 0.0:
         raise InputError(f"the command is {u[0]:g} throughout: it excites no frequency", log.name)
     if not np.ptp(y) > 0.0:
-        raise InputError("the output never changes: there is no response", log.name)
+        raise InputError("the output never changes: there is no response; log a motion of the axis", log.name)
     length = _given_period(log, period, len(u)) if period is not None else find_period(u)
     if length is not None:
         return _averaged(u, y, length, T)

@@ -43,7 +43,7 @@ def column_time(table: Table, about: TimeMap) -> np.ndarray:
     if len(finite) and abs(values[finite[0]]) > _NO_DATE:
         years = abs(values[finite[0]]) / _YEAR
         what = f"time ({column.name!r}) begins after {years:.0f} years, counted in {unit}"
-        raise InputError(f"{what}: no calendar goes so far; the unit is a smaller one", about.place)
+        raise InputError(f"{what}: later than any date; give the column a smaller unit in the map", about.place)
     _check_size(values, f"time ({column.name!r}, in s)", about.place)
     if len(finite) and abs(values[finite[0]]) > _LATE:  # from the first row on, before digits are lost to its size
         values = about.scale * (numbers - numbers[finite[0]]) * second

@@ -69,7 +69,7 @@ def _factor(spread: Spread) -> tuple[np.ndarray, float]:
     safe = np.where(scale > 0.0, scale, 1.0)
     size, directions = np.linalg.eigh(covariance / np.outer(safe, safe))
     if size.min() < -1e-6 * max(size.max(), 1e-300):
-        raise InputError("the covariance is not that of any estimate: it has a negative eigenvalue", spread.where)
+        raise InputError("the covariance has a negative eigenvalue; fit the model again with `rds fit`", spread.where)
     used = size > 1e-12 * max(size.max(), 1e-300)
     factor = safe[:, None] * directions[:, used] * np.sqrt(size[used])
     return factor, float(2.0 * gammaincinv(0.5 * used.sum(), spread.level))

@@ -68,7 +68,7 @@ def closed_poles(law: Law, models: Sequence[Model], T: float) -> np.ndarray:
     """
     axes = np.array([_known(model, T) for model in models])
     if axes[:, 2].max() > _LARGEST_DELAY:
-        raise InputError(f"a delay of more than {_LARGEST_DELAY} samples of {T:g} s is too long for its poles")
+        raise InputError(f"the delay is more than {_LARGEST_DELAY} samples of {T:g} s; choose a longer sample period")
     found = np.full((len(axes), 3 + int(axes[:, 2].max()) + len(law.G)), np.nan, dtype=complex)
     for whole in np.unique(axes[:, 2]):
         chosen = axes[:, 2] == whole

@@ -55,7 +55,8 @@ def drive_model(axis: Axis, command: Command) -> Model:
         return library_model("position-drive")
     if command is Command.PROFILE:
         if axis.limits is None:
-            raise InputError(f'mode = "pp" moves within [axis.{axis.name}.limits], which the machine\'s file lacks')
+            table = f"[axis.{axis.name}.limits]"
+            raise InputError(f'mode = "pp" needs {table} in the machine\'s file; add it, or choose mode = "csp"')
         limits = axis.limits
         return library_model("profile-drive", speed=limits.velocity, acceleration=limits.acceleration)
     tau = LOOP["tau"].default

@@ -98,7 +98,8 @@ def learn(
         if trial is not None:
             trial(number, result)
         if result.meta["ending"] != str(Ending.DONE):
-            raise InputError(f"trial {number} ended early ({result.meta['ending']}): nothing can be learnt from it")
+            ended = f"trial {number} ended early ({result.meta['ending']}), and nothing can be learnt from it"
+            raise InputError(f"{ended}; make the loop run to its end first, or lower --gain")
         if number < trials:
             for name in plan.names:
                 error = _every_sample(result, f"{name}_reference", plan) - _every_sample(

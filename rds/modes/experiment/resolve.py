@@ -271,7 +271,7 @@ def _compensated(table: TomlTable, setting: Setting, controller: Controller | No
     time, most = table.read("time"), table.read("most")
     table.done()
     if controller is None:
-        raise InputError("[signal] drives the axis without a controller, and nothing is compensated", table.place())
+        raise InputError("[signal] drives the axis without a controller: remove [error_compensation]", table.place())
     if controller.coupled:
         raise InputError(
             "[error_compensation] is for axes with controllers of their own; a coupled one does it itself",
@@ -296,7 +296,7 @@ def _following_error(words: TomlTable, setting: Setting, driven: str) -> Allowed
         raise table.fault("min_ferror", f"must be at most ferror, {ferror:g}: the error that is allowed at full speed")
     table.done()
     if driven == "signal":
-        raise InputError("[signal] drives the axis without a reference, so there is no following error", table.place())
+        raise InputError("[signal] drives the axis without a reference: remove [following_error]", table.place())
     if setting.axis.is_spindle:
         return None
     limits = setting.axis.limits

@@ -279,7 +279,7 @@ def check(block: Block, state: State) -> None:
         if not used and letter == "p" and not g and not block.m and len(words) == 1:
             raise Fault(
                 "P alone, a program number of oacs-thesis, is an option of the dialect; switch it on"
-                " (`--with program-numbers`) or leave it away",
+                " (`--with program-numbers`) or leave it out",
                 letter,
             )
         if not used and letter == "p" and turning:
@@ -319,7 +319,7 @@ def _check_thread(motion: int, words: dict[str, float]) -> None:
     elif "k" not in words:
         raise Fault(f"G{motion / 10:g} without K; write the way for each turn of the spindle", f"g{motion}")
     elif "f" in words:
-        raise Fault(f"F does not go with G{motion / 10:g}, whose speed is K times the spindle's; leave it away", "f")
+        raise Fault(f"F does not go with G{motion / 10:g}, whose speed is K times the spindle's; leave it out", "f")
 
 
 _G10 = "G10 L0, L1, L10, L11 (tool table), L2 or L20 (coordinate system)"
@@ -348,6 +348,6 @@ def _check_setting(words: dict[str, float]) -> None:
         return
     for letter in "ijq":
         if letter in words:
-            raise Fault(f"G10 L{kind:g} does not use {letter.upper()}; leave it away", letter)
+            raise Fault(f"G10 L{kind:g} does not use {letter.upper()}; leave it out", letter)
     if kind == 20 and "r" in words:
         raise Fault("G10 L20 does not use R; set the rotation with G10 L2", "r")

@@ -54,7 +54,7 @@ def _cutter(m: Context, code: int, words: dict[str, float]) -> tuple[float, int]
         if "d" not in words:
             raise Fault("D is missing; write the cutter's diameter, for example D6", f"g{code}")
         if "l" in words and m.state.plane == XY:
-            raise Fault("L, the orientation of a lathe tool, goes with the plane of G18 only; leave it away", "l")
+            raise Fault("L, the orientation of a lathe tool, goes with the plane of G18 only; leave it out", "l")
         return words["d"] / 2.0, int(words.get("l", 0))
     slot = 0
     if "d" in words:

@@ -5,26 +5,26 @@ from __future__ import annotations
 import re
 
 _G = {
-    110: "G11 ends programmable data input of other controls; leave it away, G10 needs no end here",
+    110: "G11 ends programmable data input of other controls; leave it out, G10 needs no end here",
     120: "G12 mills a circular pocket clockwise on other controls; write the circle as G2 with I and J",
     121: "G12.1 begins polar interpolation of other controls; write X and Y",
     130: "G13 mills a circular pocket on other controls; write the circle as G3 with I and J",
     150: "G15 ends polar coordinates of other controls; @ and ^ give radius and angle here, leave G15 away",
     160: "G16 begins polar coordinates of other controls; write radius and angle as @ and ^, or X and Y",
     **dict.fromkeys((171, 181, 191), "there are no axes U, V, W; use G17, G18 or G19"),
-    270: "G27 checks the reference point of other controls; leave it away",
-    282: "G28.2 homes the axes of TinyG and g2; home the machine before the program, and leave it away",
+    270: "G27 checks the reference point of other controls; leave it out",
+    282: "G28.2 homes the axes of TinyG and g2; home the machine before the program, and leave it out",
     283: "G28.3 sets the position of TinyG and g2; write G92, or G10 L20 P0",
-    284: "G28.4 homes the axes of TinyG and g2; home the machine before the program, and leave it away",
+    284: "G28.4 homes the axes of TinyG and g2; home the machine before the program, and leave it out",
     290: "G29 goes back from the reference point on other controls; write the position with G0",
     310: "G31 is the skip (probing) of other controls; write G38.2",
     320: "G32 cuts a thread on other controls; write G33 with K, the way for each turn",
-    500: "G50 ends scaling, or limits the spindle on lathes of other controls; leave it away (D of G96 limits it)",
+    500: "G50 ends scaling, or limits the spindle on lathes of other controls; leave it out (D of G96 limits it)",
     510: "G51 scales the coordinates on other controls; let the CAM program scale them, or use parameters",
     600: "G60 goes to a place from one side on other controls; write G61.1 and the moves",
     650: "G65 calls a macro of other controls; write O<name> CALL [...]",
     660: "G66 calls a macro after each move on other controls; write O<name> CALL after them",
-    670: "G67 ends G66 of other controls; leave it away",
+    670: "G67 ends G66 of other controls; leave it out",
     680: "G68 turns the coordinates on other controls; write G10 L2 P0 R and the angle",
     690: "G69 ends G68 of other controls; write G10 L2 P0 R0",
     750: "G75 cuts grooves on other controls; write its cuts as G0 and G1",
@@ -32,8 +32,8 @@ _G = {
     780: "G78 is a threading cycle of other controls; write G76 or G33",
 }
 _M = {
-    10: "M10 clamps an axis on other controls; leave it away",
-    11: "M11 releases an axis on other controls; leave it away",
+    10: "M10 clamps an axis on other controls; leave it out",
+    11: "M11 releases an axis on other controls; leave it out",
     97: "M97 calls part of a program on other controls; write O<name> CALL",
     82: "M82 counts the filament of 3-D printers absolutely; let a CAM program write the part for a mill",
     83: "M83 counts the filament of 3-D printers from move to move; let a CAM program write the part for a mill",
@@ -80,15 +80,15 @@ def no_such_g(code: int) -> str:
     """Why a G word (ten times its number) cannot be used, and what to do."""
     if code < 0:
         return f"G{code / 10:g} is negative; G words are not"
-    return _G.get(code, f"there is no G{code / 10:g}; correct the word or leave it away")
+    return _G.get(code, f"there is no G{code / 10:g}; correct the word or leave it out")
 
 
 def no_such_m(code: int) -> str:
     if code < 0:
         return f"M{code} is negative; M words are not"
     if 100 <= code <= 199:
-        return "user-defined M words, and those of 3-D printers, are outside this dialect; leave it away"
-    return _M.get(code, f"there is no M{code}; correct the word or leave it away")
+        return "user-defined M words, and those of 3-D printers, are outside this dialect; leave it out"
+    return _M.get(code, f"there is no M{code}; correct the word or leave it out")
 
 
 FANUC_CONTOUR = (

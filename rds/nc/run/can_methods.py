@@ -72,7 +72,7 @@ def check_room(machine: Machine, motion: SerialMotion, method: str, bitrate: int
     most = 1024.0 if method == "A" else motion_frames.MOST_INCREMENT
     if (steps > most).any():
         name = motion.axes[int(np.argmax(steps))]
-        raise InputError(f"{name} moves {steps.max():.0f} counts in a step; {most:.0f} at most: feed less")
+        raise InputError(f"{name} moves {steps.max():.0f} counts in a step, more than {most:.0f}; lower the feed")
     count = len(names)
     bits = (1 + count) * longest(8) if method == "A" else count * longest(8) * 2 // motion_frames.PIECE
     share = bits / (bitrate * period)

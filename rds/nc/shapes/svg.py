@@ -330,7 +330,7 @@ def _transform(text: str, name: str) -> Matrix:
         try:
             matrix = _times(matrix, _one_transform(kind, v))
         except (ValueError, IndexError):
-            raise InputError(f"transform {kind}({inner}) has too few numbers", name) from None
+            raise InputError(f"transform {kind}({inner}) has too few numbers; save it as plain SVG", name) from None
     return matrix
 
 

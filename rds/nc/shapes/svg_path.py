@@ -61,7 +61,7 @@ def _commands(d: str, where: str) -> Iterator[tuple[str, list[float]]]:
             values = []
             command = {"M": "L", "m": "l"}.get(command, command)
     if values:
-        raise InputError(f"path command {command} has too few numbers", where)
+        raise InputError(f"path command {command} has too few numbers; save it as plain SVG", where)
 
 
 def _split_flags(d: str, where: str) -> Iterator[tuple[str, float]]:

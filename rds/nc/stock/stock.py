@@ -79,7 +79,7 @@ class Stock:
         if path.suffix.lower() == ".npz":
             return self._saved(path)
         if path.suffix.lower() != ".stl":
-            raise InputError("is no part; known: .stl, .npz", str(path))
+            raise InputError("is no file of a part; give an STL model (.stl), or heights from --save (.npz)", str(path))
         field = np.full_like(self.heights, self.floor)
         raise_triangles(field, self.x0, self.y0, self.cell, _triangles(path))
         return field

@@ -132,7 +132,7 @@ class _History:
         """Take the last change back. InputError where the loop will not have the old value."""
         name, value = self.changes.pop()
         if name not in self._choices:
-            raise InputError("what was changed belongs to something that is not chosen any more")
+            raise InputError("the changed value belongs to a choice that is no longer made; choose it again first")
         count = len(self.changes)
         self._choices.set(name, value)
         del self.changes[count:]

@@ -124,5 +124,5 @@ def _test(part: str) -> Callable[[int, str], bool]:
             f"filter {part!r} must be an identifier, as in 0x020, a range, as in 0x020-0x07F, or part of a name"
         ) from None
     if low > high:
-        raise InputError(f"filter {part!r} goes from a higher to a lower identifier; turn it round")
+        raise InputError(f"filter {part!r} goes from a higher to a lower identifier; swap them")
     return lambda identifier, name: low <= identifier <= high

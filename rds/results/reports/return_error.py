@@ -32,7 +32,8 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
     gap = path[-1].end - path[0].start
     if np.abs(gap).max() > _SAME:
         away = ", ".join(f"{name} {value:g}" for name, value in zip(LINEAR, gap, strict=True))
-        raise InputError(f"the path does not come back to its start: it ends {away} mm from it", str(files[0]))
+        gap_said = f"the path does not come back to its start: it ends {away} mm from it"
+        raise InputError(f"{gap_said}; end the program where it begins", str(files[0]))
     columns = ["run", *(f"return error {name} [µm]" for name in LINEAR), "together [µm]"]
     columns += ["farthest out [mm]", "time [s]", "in the thesis"]
     rows = [_row(run) for run in runs]

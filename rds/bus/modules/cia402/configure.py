@@ -239,7 +239,8 @@ def _communication(node: canopen.RemoteNode, drive: DriveSettings, settings: Set
         exponent -= 1
     value = round(period / 10.0**exponent)
     if value > 255:
-        raise InputError(f"a sample period of {period} s can't be said as an interpolation time 0x60C2", drive.name)
+        what = f"a sample period of {period} s does not fit the drive's interpolation time 0x60C2"
+        raise InputError(f"{what}; choose a whole number of ms, at most 255", drive.name)
     _optional(node, drive, 0x60C2, 2, exponent)
     _optional(node, drive, 0x60C2, 1, value)
 

@@ -80,7 +80,7 @@ def position_byte(steps: int) -> int:
     """A step of `steps` BLU (-127 to 127) as a byte. InputError for more."""
     if not -MOST_STEPS <= steps <= MOST_STEPS:
         raise InputError(
-            f"{steps} BLU in one step; a position byte holds {MOST_STEPS} at most: feed less, or a longer time"
+            f"{steps} BLU in one step; a position byte holds {MOST_STEPS} at most: lower the feed or lengthen the step"
         )
     return -steps | BACKWARD if steps < 0 else steps
 
