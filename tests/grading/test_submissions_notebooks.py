@@ -55,6 +55,13 @@ def test_lines_keep_their_numbers() -> None:
     assert text.split("\n")[6] == "def control():"
 
 
+def test_a_fault_of_syntax_is_told_with_its_cell() -> None:
+    cells = ("print(1)\nprint(2)", "x = 1\ndef control(t, r, y, state, params)\n    return x")
+    found = converted(notebook(*cells).encode())
+    assert found.notes[-1].startswith("line 7 is cell 2, line 2 of the notebook: expected ':'; mend it")
+    assert found.code.decode().split("\n")[6].startswith("def control")  # as Python's own message has it
+
+
 def test_a_cell_s_encoding_is_the_notebook_s() -> None:
     code = converted(notebook("# -*- coding: latin-1 -*-\nK = 'ü'\ndef control():\n    return K").encode()).code
     names: dict[str, object] = {}

@@ -58,7 +58,10 @@ def converted(data: bytes, wanted: Sequence[str] = INTERFACE) -> Converted:
     text = "\n".join(lines) + "\n"
     try:
         body = ast.parse(text).body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        if isinstance(error, SyntaxError) and error.lineno is not None and 2 < error.lineno <= len(lines):
+            place = f"line {error.lineno} is {_place(lines, error.lineno)} of the notebook"
+            notes.append(f"{place}: {error.msg}; mend it, and run the whole notebook before it is handed in again")
         return Converted(_encoded(text), tuple(notes))
     try:
         keep, elsewhere = needed(body, set(wanted))
@@ -86,10 +89,15 @@ def converted(data: bytes, wanted: Sequence[str] = INTERFACE) -> Converted:
 
 def _not_followed(lines: Sequence[str], fault: NotFollowed) -> str:
     """Where it is in the notebook, and what its author can do."""
-    at = max(number for number in range(fault.line) if _CELL.fullmatch(lines[number]))
-    place = f"{lines[at][2:]}, line {fault.line - at - 1}"
+    place = _place(lines, fault.line)
     said = f"the notebook cannot be graded as what it ran: {place} ({lines[fault.line - 1].strip()[:80]}): {fault.why}"
     return f"{said}; set what is graded in statements of their own, such as params[...] = ..., behind all others"
+
+
+def _place(lines: Sequence[str], line: int) -> str:
+    """The cell, and the line in it, of a line of all cells' code."""
+    at = max(number for number in range(line) if _CELL.fullmatch(lines[number]))
+    return f"{lines[at][2:]}, line {line - at - 1}"
 
 
 def _written(cells: Sequence[str]) -> str:
