@@ -63,7 +63,7 @@ def test_a_part_program_is_compensated_online(tmp_path: Path) -> None:
     [
         ({"error_compensation": {"time": 0.0}}, "time"),
         ({"error_compensation": {"often": 1.0}}, "unknown key 'often'"),
-        ({"error_compensation": {}, "controller": None, "reference": None, "signal": 1.0}, "without a controller: remove"),
+        ({"error_compensation": {}, "controller": None, "reference": None, "signal": 1.0}, "a controller: remove"),
     ],
 )
 def test_what_will_not_do_is_refused(words: dict[str, Any], says: str) -> None:
