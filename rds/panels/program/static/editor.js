@@ -210,6 +210,8 @@ function render({ model, el }) {
   model.on("change:text", () => {
     if (timer || model.get("text") === view.state.doc.toString()) return; // what is being typed counts
     view.setState(fresh()); // another program: nobody undoes it into the one before
+    model.set("caret", 1); // where its cursor is, from which it may be run
+    model.save_changes();
     mark();
     run();
     shut();
