@@ -20,6 +20,14 @@ def is_dated(folder: str) -> bool:
     return bool(_DATED.fullmatch(folder))
 
 
+def dashed_time(said: str) -> datetime | None:
+    """As in "2026-01-09-10-00-00"; None for what is no time."""
+    try:
+        return datetime.strptime(said, "%Y-%m-%d-%H-%M-%S")
+    except ValueError:
+        return None
+
+
 def is_version(folder: str) -> bool:
     """Whether a folder is one attempt in Teams."""
     return bool(_VERSION.fullmatch(folder))

@@ -18,14 +18,13 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
-from rds.core.errors import InputError
-from rds.grading.intake.attempts import is_dated, is_version
+from rds.grading.intake.attempts import dashed_time, is_dated, is_version
 from rds.grading.intake.gradescope import METADATA, Submitter, read_metadata
 from rds.grading.intake.items import Item
 from rds.grading.intake.names import shown, without_number
+from rds.grading.intake.nbgrader import STAMP, assignment_in, is_nbgrader
 
 TIMES = "timestamps.csv"  # of the instructor, at the top
-STAMP = "timestamp.txt"  # of nbgrader, beside a submission
 NOT_UNDERSTOOD = "the time at which it was handed in cannot be understood"  # begins a note
 # folders in which one student keeps parts of a submission
 _PARTS = frozenset(
@@ -125,8 +124,8 @@ def sorted_out(
         for student in folders:
             sorting.files_of(student)
         return sorting.layout("blackboard", times)
-    if _is_nbgrader(items, assignments):
-        name = _assignment(items, assignments)
+    if is_nbgrader(items, assignments):
+        name = assignment_in(items, assignments)
         for item in items:
             sorting.nbgrader(item, name)
         for student in folders:
@@ -254,7 +253,7 @@ class _Sorting:
             handed = self.files_of(match["user"] if alone else match["before"], platform="blackboard")
             handed.has_times = True
             if match["file"]:
-                when = _dashed_time(match["time"])
+                when = dashed_time(match["time"])
                 handed.items.append(replace(item, parts=(match["file"],), time=when, attempt=match["time"]))
 
     def brightspace(self, items: Sequence[Item], folders: Sequence[str]) -> None:
@@ -311,7 +310,7 @@ class _Sorting:
             if inner.endswith(".ceg"):
                 return
             folder.has_times = True
-            folder.items.append(replace(item, parts=item.parts[2:], time=_dashed_time(inner), attempt=inner))
+            folder.items.append(replace(item, parts=item.parts[2:], time=dashed_time(inner), attempt=inner))
         else:
             folder.items.append(replace(item, parts=item.parts[1:], time=None))
 
@@ -333,14 +332,6 @@ class _Sorting:
         handed.has_times |= who is not None
         when = None if who is None else who.time
         handed.items.append(replace(item, parts=item.parts[1:], time=when, attempt=item.parts[0]))
-
-
-def _dashed_time(said: str) -> datetime | None:
-    """As in "2026-01-09-10-00-00"; None for what is no time."""
-    try:
-        return datetime.strptime(said, "%Y-%m-%d-%H-%M-%S")
-    except ValueError:
-        return None
 
 
 def _brightspace_time(said: str) -> datetime | None:
@@ -409,40 +400,3 @@ def _is_vpl(items: Sequence[Item]) -> bool:
     students = {item.parts[0] for item in items if item.is_handed_in}
     others = {item.parts[0] for item in items if item.is_handed_in and not (item.parts[2:] and is_dated(item.parts[1]))}
     return 2 * len(others) < len(students)
-
-
-def _is_nbgrader(items: Sequence[Item], assignments: Sequence[str]) -> bool:
-    """Whether more than half of the students' folders look so: what one of them holds is for its author alone.
-
-    One with code beside its folders does not, but for nbgrader's stamp in them: there each assignment has its folder.
-    """
-    deep = [item for item in items if len(item.parts) >= 3]
-    stamped = {item.parts[0] for item in deep if item.parts[2] == STAMP}
-    marked = stamped | {item.parts[0] for item in deep if item.parts[1] in assignments}
-    names = _of_several(items)
-    fits = marked | {item.parts[0] for item in deep if item.parts[1] in names}
-    fits -= {item.parts[0] for item in items if len(item.parts) == 2 and item.is_code} - stamped
-    return bool(marked & fits) and 2 * len(fits) > len({item.parts[0] for item in items if len(item.parts) > 1})
-
-
-def _assignment(items: Sequence[Item], assignments: Sequence[str]) -> str:
-    all_names = {item.parts[1] for item in items if len(item.parts) >= 3}
-    for name in assignments:
-        if name in all_names:
-            return name
-    names = sorted(_of_several(items) or all_names)
-    if len(names) == 1:
-        return names[0]
-    raise InputError(
-        f"the submissions are of several assignments ({', '.join(map(shown, names[:8]))}); give the folder of the "
-        "assignment the name of one of them"
-    )
-
-
-def _of_several(items: Sequence[Item]) -> set[str]:
-    """The names of folders inside students' folders that more than one student has: the course's assignments."""
-    holders: dict[str, set[str]] = {}
-    for item in items:
-        if len(item.parts) >= 3:
-            holders.setdefault(item.parts[1], set()).add(item.parts[0])
-    return {name for name, students in holders.items() if len(students) > 1}

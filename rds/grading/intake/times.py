@@ -8,7 +8,8 @@ from zoneinfo import ZoneInfo
 
 from rds.core.errors import InputError
 from rds.grading.intake.items import Refusal
-from rds.grading.intake.layouts import NOT_UNDERSTOOD, STAMP, TIMES, Layout, StudentFiles
+from rds.grading.intake.layouts import NOT_UNDERSTOOD, TIMES, Layout, StudentFiles
+from rds.grading.intake.nbgrader import STAMP
 from rds.grading.table_text import rows_by_heading
 
 _LARGEST = 4 << 20  # bytes
