@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.identification.logs import sampling
-from rds.identification.logs.log import Finding, Log
+from rds.identification.logs.log import Finding, Gravity, Log
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.steps import step_of
 from rds.identification.logs.time_base import time_base
@@ -171,6 +171,12 @@ def test_gaps_duplicates_and_blanks(tmp_path: Path) -> None:
     first, second = read_log(tmp_path / "log.csv")
     assert (len(first), len(second), second.name) == (1000, 2990, "log part 2")
     assert "gap" in grave(read(tmp_path, made, 'gaps = "keep"\n'))
+    (tmp_path / "log.csv.map.toml").unlink()
+    text = (tmp_path / "log.csv").read_text()
+    headings = "time (s),command (V),position (mm)" + text[text.index("\n") :]
+    (tmp_path / "bare.csv").write_text(headings)
+    with pytest.raises(InputError, match=r"1 gap.*`rds data describe bare.csv --write-map` writes a map"):
+        read_log(tmp_path / "bare.csv")
 
     made = {name: np.insert(values, 500, values[500]) for name, values in axis().items()}
     with pytest.raises(InputError, match="1 samples have the time of the one before, the first is sample 501"):
@@ -189,6 +195,28 @@ def test_gaps_duplicates_and_blanks(tmp_path: Path) -> None:
     made["time"][2000:] -= 1.0
     with pytest.raises(InputError, match=r"time goes back at sample 2000, from 1\.999 to 1 s"):
         read(tmp_path, made)
+
+
+def test_stretches_at_rest_beside_others_are_left_out_and_named(tmp_path: Path) -> None:
+    made = axis()
+    made["voltage"][1000:2000] = 0.0
+    made["position"][1000:2000] = made["position"][1000]
+    made = {name: np.delete(values, [1000, 2000]) for name, values in made.items()}
+    read(tmp_path, made, 'gaps = "keep"\n')
+    (tmp_path / "log.csv.map.toml").write_text('gaps = "split"\n' + MAP)
+    logs = read_log(tmp_path / "log.csv")
+    assert [log.name for log in logs] == ["log part 1", "log part 3"]
+    for log in logs:
+        assert grave(log)["excitation"].what.startswith(
+            "log part 2 (1.001 to 1.999 s) was left out: the command is 0 V"
+        )
+    # alone it stays, with its fault
+    made = {name: values[500:1990] if name != "voltage" else 0.0 * values[500:1990] for name, values in made.items()}
+    made = {name: np.delete(values, [700]) for name, values in made.items()}
+    read(tmp_path, made, 'gaps = "keep"\n')
+    (tmp_path / "log.csv.map.toml").write_text('gaps = "split"\n' + MAP)
+    logs = read_log(tmp_path / "log.csv")
+    assert len(logs) > 1 and {grave(log)["excitation"].gravity for log in logs} == {Gravity.FAULT}
 
 
 @given(

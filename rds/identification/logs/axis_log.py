@@ -10,6 +10,7 @@ from rds.core.errors import InputError
 from rds.identification.logs.clocks import hold, resample
 from rds.identification.logs.columns import column_time, quantity
 from rds.identification.logs.csv_table import missing_samples
+from rds.identification.logs.excitation import is_steady
 from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import QUANTITIES, RATES, Clock, Finding, Gravity, Log
 from rds.identification.logs.map import LogMap
@@ -78,7 +79,31 @@ def axis_logs(table: Table, mapping: LogMap, about: AxisMap, second: Second | No
             clocks=_clocks(table, mapping, parts, second, base),
         )
         logs.append(with_findings(log, machine_axis))
-    return logs
+    return _without_resting(logs)
+
+
+def _without_resting(logs: list[Log]) -> list[Log]:
+    """The stretches of one recording without those that tell nothing beside the others, which say what was left out."""
+    untold = {log.name: told for log in logs if (told := _tells_nothing(log))}
+    if not untold or len(untold) == len(logs):
+        return logs
+    left_out = tuple(
+        Finding(
+            "excitation",
+            f"{log.name} ({log.time[0]:.6g} to {log.time[-1]:.6g} s) was left out: {untold[log.name]}",
+            Gravity.WARNING,
+        )
+        for log in logs
+        if log.name in untold
+    )
+    return [replace(log, findings=log.findings + left_out) for log in logs if log.name not in untold]
+
+
+def _tells_nothing(log: Log) -> str:
+    """Why a stretch tells nothing of the axis, or "". A steady speed does, beside others."""
+    if is_steady(log):
+        return ""
+    return next((f.what for f in log.findings if f.kind == "excitation" and f.gravity is Gravity.FAULT), "")
 
 
 def _parts(

@@ -119,7 +119,13 @@ def logs_of(table: Table, mapping: LogMap) -> list[Log]:
     from rds.identification.logs.second_file import Second, read_second
 
     second: Second | None = read_second(table, mapping) if mapping.second is not None else None
-    return [log for axis in mapping.axes.values() for log in axis_logs(table, mapping, axis, second)]
+    try:
+        return [log for axis in mapping.axes.values() for log in axis_logs(table, mapping, axis, second)]
+    except InputError as error:
+        if mapping.path is not None or "the map" not in str(error):
+            raise
+        made = f"`rds data describe {table.path.name} --write-map` writes a map, which this file has not yet"
+        raise InputError(f"{error}. {made}") from None
 
 
 def _machine(name: object) -> Machine | None:
