@@ -124,6 +124,25 @@ def test_what_is_hidden_is_passed_over_and_told(drawn: Read, other: str) -> None
     assert drawing.notes == ["passed over: 1 × hidden objects"]
 
 
+@pytest.mark.parametrize(
+    ("inner", "is_drawn"),
+    [
+        ('<path fill="none" d="M0 0H99"/>', False),
+        ('<g fill="none"><path d="M0 0H99"/></g>', False),
+        ('<path style="fill:none;stroke:none" d="M0 0H99"/>', False),
+        ("<style>.a{fill:none}</style><path class='a' d='M0 0H99'/>", False),
+        ('<path d="M0 0H99"/>', True),
+        ('<g stroke="red"><path fill="none" d="M0 0H99"/></g>', True),
+        ('<g fill="none"><path style="stroke:#000" d="M0 0H99"/></g>', True),
+        ("<style>g > path{stroke:red}</style><g><path fill='none' d='M0 0H99'/></g>", True),
+    ],
+)
+def test_what_has_neither_fill_nor_stroke_is_passed_over_and_told(drawn: Read, inner: str, is_drawn: bool) -> None:
+    drawing = drawn(BOX + inner)
+    assert extent(drawing) == pytest.approx([0, 40, 99, 100] if is_drawn else [10, 40, 40, 80])
+    assert [("which nobody sees" in note) for note in drawing.notes] == ([] if is_drawn else [True])
+
+
 def test_a_style_sheet_without_end_is_read_in_a_moment(drawn: Read) -> None:
     """It once took the square of its length: hours for these."""
     drawing = drawn(f"<style>{'/*' * 500_000}</style><style>{'a' * 1_000_000}</style>{BOX}")

@@ -6,7 +6,7 @@ Our own, because `svgpathtools` gives paths; a part needs their units and layers
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import cos, hypot, radians, sin, sqrt, tan
 from pathlib import Path
 from xml.etree import ElementTree
@@ -32,10 +32,15 @@ _PASSED_OVER = {
 _XLINK = "{http://www.w3.org/1999/xlink}"
 _ASPECT = re.compile(r"x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?")
 _SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}  # of the room that is left, before the drawing
-_RULED = ("display", "visibility", "transform")  # what is looked for in style sheets
+_PAINT = ("fill", "stroke")
+_RULED = ("display", "visibility", "transform", *_PAINT)  # what is looked for in style sheets
+_UNSEEN = ("none", "transparent")
+_BARE = "objects with fill none and no stroke, which nobody sees; give them a stroke if they are to be cut"
 _SIMPLE = re.compile(r"[.#]?[\w-]+")  # selectors that are followed: of an element's name, class or id
+_SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 _NOT_DRAWN = ("defs", "metadata", "clipPath", "mask", "marker", "pattern", "symbol", "style", "title", "desc")
 DEEPEST = 100  # groups within one another
+_PAINTED = {"fill": "black", "stroke": "none"}  # where nothing is said
 Matrix = np.ndarray  # 2 × 3
 View = tuple[float, float]  # what per cent are of, in user units
 
@@ -44,7 +49,8 @@ def read_svg(path: Path) -> Drawing:
     """The curves of an SVG file. Its size and viewBox say what is a mm; without a unit a user unit is 1/96 inch.
 
     The layer of a curve is the label of the Inkscape layer that it is in, or the id of its outermost group with one.
-    What is hidden, and text and images, is passed over and told; what is clipped or masked is drawn whole, and told.
+    What is hidden or has neither fill nor stroke, and text and images, is passed over and told; what is clipped or
+    masked is drawn whole, and told.
     InputError for what is no SVG.
     """
     name = str(path)
@@ -63,7 +69,7 @@ def read_svg(path: Path) -> Drawing:
     reader = _Reader(name, root)
     matrix, view = _page(root, name)
     for child in root if reader.is_shown(root, True) else ():
-        reader.walk(child, matrix, "", 0, view)
+        reader.walk(child, matrix, "", 0, view, paint=reader.paint(root, _PAINTED))
     notes = [f"passed over: {count} × {what}" for what, count in reader.passed_over.items()]
     return Drawing(joined(reader.curves), name, notes)
 
@@ -117,7 +123,7 @@ def _length(text: str | None, name: str, per_unit: float | None = None, whole: f
 
 
 def _rules(root: ElementTree.Element) -> dict[str, dict[str, str]]:
-    """What style sheets in the file say of display, visibility and transform, by selector."""
+    """What style sheets in the file say of display, visibility, transform and paint, by selector."""
     found: dict[str, dict[str, str]] = {}
     for element in root.iter():
         if _tag(element) == "style":
@@ -145,8 +151,12 @@ class _Reader:
         self.by_id = {element.get("id"): element for element in root.iter() if element.get("id")}
         self.taken = 0  # points so far; an element counts as one, a clone as fifty
         self.cloned: list[ElementTree.Element] = []  # what the clones show that are being drawn
-        for selector in self.rules:
-            if not _SIMPLE.fullmatch(selector):
+        self.paint_is_known = True
+        for selector, said in self.rules.items():
+            if _SIMPLE.fullmatch(selector):
+                continue
+            self.paint_is_known &= said.keys().isdisjoint(_PAINT)
+            if not said.keys() <= set(_PAINT):
                 self._pass_over(
                     f"the style sheet's rule for {selector[:60]!r} that hides, shows or transforms; "
                     "write that at the objects"
@@ -162,6 +172,12 @@ class _Reader:
             return None
         visibility = said.get("visibility", "inherit")
         return visible if visibility == "inherit" else visibility == "visible"
+
+    def paint(self, element: ElementTree.Element, outer: Mapping[str, str]) -> dict[str, str]:
+        """Fill and stroke of an element, which are those of what it is in unless it says otherwise."""
+        own = {key: element.get(key, "") for key in _PAINT} | self._ruled(element)
+        own |= _declared(element.get("style", ""))
+        return {key: outer[key] if own[key] in ("", "inherit") else own[key] for key in _PAINT}
 
     def _ruled(self, element: ElementTree.Element) -> dict[str, str]:
         """What the style sheets say of an element."""
@@ -180,6 +196,7 @@ class _Reader:
         view: View,
         visible: bool = True,
         use: ElementTree.Element | None = None,
+        paint: Mapping[str, str] = _PAINTED,
     ) -> None:
         """The curves of an element and of those within it; `use`: the clone that it is drawn for."""
         tag = _tag(element)
@@ -193,6 +210,7 @@ class _Reader:
         if tag in _PASSED_OVER:
             self._pass_over(_PASSED_OVER[tag])
             return
+        paint = self.paint(element, paint)
         style = _declared(element.get("style", ""))
         if any((style.get(key) or element.get(key) or "none") != "none" for key in ("clip-path", "mask")):
             self._pass_over("a clip or mask: its object is drawn whole (Object > Clip > Release, Path > Intersection)")
@@ -209,7 +227,7 @@ class _Reader:
             label = element.get(f"{_INKSCAPE}label") if element.get(f"{_INKSCAPE}groupmode") == "layer" else None
             inner = label or layer or (element.get("id") or "" if tag == "g" else "")
             for child in element:
-                self.walk(child, matrix, inner, depth + 1, view, shown)
+                self.walk(child, matrix, inner, depth + 1, view, shown, paint=paint)
             return
         if tag == "use":
             target = self.by_id.get((element.get("href") or element.get(f"{_XLINK}href") or "").strip().lstrip("#"))
@@ -220,8 +238,11 @@ class _Reader:
             self.cloned.append(target)
             at = [_length(element.get(key), self.name, _MM["px"], size) for key, size in zip("xy", view, strict=True)]
             moved = _times(matrix, np.array([[1.0, 0.0, at[0]], [0.0, 1.0, at[1]]]))
-            self.walk(target, moved, layer, depth + 1, view, shown, use=element)
+            self.walk(target, moved, layer, depth + 1, view, shown, use=element, paint=paint)
             self.cloned.pop()
+            return
+        if tag in _SHAPES and self.paint_is_known and all(paint[key] in _UNSEEN for key in _PAINT):
+            self._pass_over(_BARE)
             return
         for points, closed, circle in self._shape(tag, element, matrix, view):
             curve = circle_curve(*circle, layer) if circle else polyline_curve(_moved(points, matrix), closed, layer)
