@@ -1,4 +1,4 @@
-"""Beside a whole run's collection a process compiles the planner's kernels: each worker would take a minute to."""
+"""Beside a whole run's collection a process compiles the large kernels: each worker would take a minute to."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _COMPILING = pytest.StashKey[subprocess.Popen[bytes]]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Where all tests run side by side; a few of them need no planner, as a rule."""
+    """Where all tests run side by side; a few of them need no kernels, as a rule."""
     is_whole = config.args_source in (pytest.Config.ArgsSource.TESTPATHS, pytest.Config.ArgsSource.INVOCATION_DIR)
     if is_whole and config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
         config.stash[_COMPILING] = subprocess.Popen(
@@ -28,6 +28,28 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 
 def main() -> None:
+    """What the first tests need comes first."""
+    compile_fast_lane()
+    compile_fits()
+    compile_planner()
+
+
+def compile_fast_lane() -> None:
+    """The reader of plain lines of part programs."""
+    from rds.nc.language.fast_lane import kernel
+
+    kernel()
+
+
+def compile_fits() -> None:
+    """Fit two of the logs that come with the package."""
+    import rds
+
+    for name, structure in (("mini-cnc-X-steps", "axis"), ("mini-cnc-spindle-steps", "spindle")):
+        rds.fit(rds.read_log(rds.shipped_log(name)), structure)
+
+
+def compile_planner() -> None:
     """Plan a short motion that has every kind of segment and of corner."""
     from rds.core.compiling import compile_tiered
     from rds.interpolators.motion import Limits, plan
