@@ -228,6 +228,7 @@ class _Reader:
     def _insert(self, body: Pairs, layer: str, m: np.ndarray, depth: int) -> None:
         block = self.blocks.get(text_of(body, 2).lower())
         if block is None or depth >= DEEPEST:
+            self._count(50)
             self._pass_over("inserts of blocks that are not in the file")
             return
         (bx, by), entities = block
