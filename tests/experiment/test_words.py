@@ -85,6 +85,7 @@ def edit(change: str, base: str = GOOD) -> str:
         ("[timing]\nstop_after = -1", 16, "must be a whole number from 0"),
         ("[timing]\npriority = 100", 16, "priority = 100 must be a whole number from 1 to 99"),
         ("[timing]\ncpu = 1.5", 16, "cpu = 1.5 must be a whole number"),
+        ("[timing]\ncpu = 4095", 16, "cpu = 4095 is not a processor that this program may use; it may use .0"),
         ("[bus]\nchanel = 'a'", 16, "unknown key 'chanel' in .bus.; known keys: .*; did you mean 'channel'"),
         ("[bus]\ninterface = 'socketcam'", 16, "'socketcam' is unknown; known: .*socketcan"),
         ("[bus]\nchannel = 1.5", 16, "channel = 1.5 must be the name or the number"),
@@ -144,6 +145,13 @@ def edit(change: str, base: str = GOOD) -> str:
 )
 def test_what_is_wrong_is_named(alone: Path, change: str, line: int | None, said: str) -> None:
     refused(alone, edit(change), line, said)
+
+
+def test_a_processor_is_chosen_only_where_the_system_can(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("os.sched_setaffinity", raising=False)
+    (alone / "experiment.toml").write_text(edit("[timing]\ncpu = 0"))
+    with pytest.raises(RdsError, match="cpu = 0 cannot be chosen on this system, only on Linux; remove it"):
+        rds.Experiment.from_toml(alone / "experiment.toml")
 
 
 @pytest.mark.parametrize(

@@ -291,7 +291,7 @@ def _take_over(directory: Path, ring: Ring, period: float, reason: str) -> None:
     while target and is_alive(target, str(ring.path)):
         recorder.drain()
         if time.monotonic() > deadline:
-            os.kill(target, signal.SIGKILL)
+            os.kill(target, getattr(signal, "SIGKILL", signal.SIGTERM))  # Windows has the second alone, which ends it
             break
         time.sleep(_POLL)
     if target:
