@@ -312,6 +312,18 @@ def test_what_an_installation_may_lack_is_imported_late() -> None:
                 assert place.startswith(("panels/", may.get(package, "panels/"))), f"{place} imports {package}"
 
 
+def test_modules_of_unix_are_imported_by_what_makes_grades_alone() -> None:
+    """Windows has none of them, and no sandbox; what a batch has made in a container is read there, too."""
+    unix = ("fcntl", "resource", "pwd", "grp", "termios", "tty")
+    for path in ROOT.rglob("*.py"):
+        place = path.relative_to(ROOT).as_posix()
+        heads = [node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.Import)]
+        if {name.name for node in heads for name in node.names} & set(unix):
+            assert place.startswith(("grading/sandbox/", "grading/batch/scratch.py", "core/parallel/remote.py")), place
+    missing = f"import sys, subprocess, tempfile, IPython\nfor name in {unix}: sys.modules[name] = None\n"
+    loaded(missing + "import rds.panels.grading.panel, rds.grading.exports.export, rds.grading.review.best")
+
+
 def test_a_simulation_of_a_student_s_file_imports_nothing_heavy(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text(
         "def control(t, r, y, state, params):\n    return 10.0 * (r.position - y), state\n"

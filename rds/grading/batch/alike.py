@@ -20,6 +20,7 @@ from rds.core.parallel import spread
 from rds.core.parallel.reader_process import confine
 from rds.core.parallel.scheduler import Scheduler
 from rds.grading.assignment.assignment import Assignment
+from rds.grading.batch.finished import CODE
 from rds.grading.batch.queue import MEMORY, Queued, queued
 from rds.grading.batch.similarity import (
     Fingerprints,
@@ -32,7 +33,7 @@ from rds.grading.batch.similarity import (
     similar_pairs,
 )
 from rds.grading.batch.spool import Spool, Spooled
-from rds.grading.batch.work import CODE, Task, graded, setup_of
+from rds.grading.batch.work import Task, graded, setup_of
 from rds.grading.grade import AS_SOLUTION, BEHAVIOUR
 from rds.grading.intake import collect
 

@@ -19,6 +19,7 @@ from rds.grading.review.entries import Review, read_review
 from rds.grading.review.everyone import everyone
 
 RECORD, STUDENTS, GRADE, FEEDBACK = "batch.json", "students", "grade.json", "feedback.html"
+CODE, COLUMNS = "submission.py", "columns.parquet"  # what a submission is called in messages to its author, too
 
 
 @dataclass(frozen=True)

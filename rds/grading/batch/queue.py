@@ -12,8 +12,8 @@ from rds.core.parallel import spread
 from rds.core.parallel.reader_process import confine
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.assignment.late_rules import days_late
+from rds.grading.batch.finished import CODE
 from rds.grading.batch.spool import Spool, Spooled
-from rds.grading.batch.work import CODE
 from rds.grading.grade import Grade, Status
 from rds.grading.intake import HandedIn, Intake
 from rds.grading.intake.items import Refusal

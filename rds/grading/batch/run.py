@@ -19,6 +19,7 @@ from rds.grading.assignment.assignment import COPY_SECRET, Assignment, read_assi
 from rds.grading.assignment.assignment import FILE as ASSIGNMENT
 from rds.grading.assignment.late_rules import LateRules
 from rds.grading.batch.alike import Behaviour, alike
+from rds.grading.batch.finished import CODE, FEEDBACK
 from rds.grading.batch.journal import FILE as JOURNAL
 from rds.grading.batch.journal import Journal
 from rds.grading.batch.outcome import BatchOutcome
@@ -26,7 +27,7 @@ from rds.grading.batch.queue import Queued, keep, queued, ungraded
 from rds.grading.batch.record import FILE, check_same, read_record, record_of
 from rds.grading.batch.similarity_table import alike_json
 from rds.grading.batch.warm_worker import fault_of
-from rds.grading.batch.work import CODE, FEEDBACK, Answer, Task, graded, setup_of
+from rds.grading.batch.work import Answer, Task, graded, setup_of
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.course.class_list import ClassList, read_class_list
 from rds.grading.course.groups import by_group

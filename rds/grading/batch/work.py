@@ -17,6 +17,7 @@ from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.core.private_files import make_folder, write_private
 from rds.grading.assignment.assignment import FILE, Assignment, read_assignment
+from rds.grading.batch.finished import CODE, COLUMNS, FEEDBACK
 from rds.grading.batch.grade_one import grade_with_runs
 from rds.grading.batch.scratch import scratch
 from rds.grading.batch.spool import Spooled
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from rds.grading.cases.case import CaseRun
 
 _ANSWERS = ("_command", "_voltage", "_modelled")  # columns of what a submission answers
-CODE = "submission.py"  # what a submission is called in messages to its author, wherever it is graded
-COLUMNS, FEEDBACK = "columns.parquet", "feedback.html"
 _SOLUTION = "reference solution"  # the student whose plants it runs on
 
 

@@ -12,10 +12,9 @@ from typing import Any
 from rds.core.atomic import write_files, write_whole
 from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
-from rds.grading.batch.finished import Finished, read_finished
+from rds.grading.batch.finished import CODE, Finished, read_finished
 from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.run import BatchOptions, grade_all
-from rds.grading.batch.work import CODE
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.feedback.plain_text import cell, csv_line, one_line
 from rds.grading.grade import CriterionScore, Grade, Status
