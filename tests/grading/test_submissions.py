@@ -420,6 +420,13 @@ def test_which_file_of_several(tmp_path: Path) -> None:
     assert found["cy"].read() == b"law (1).py"
 
 
+def test_the_number_of_an_accepted_name_is_its_own(tmp_path: Path) -> None:
+    """The next task's file in the same folder is no newer attempt of this one."""
+    files = {"ada/task-1.py": "this", "ada/task-2.py": "next", "ben/task-1-1.py": "again", "ben/task-1.py": "before"}
+    found = rows(collect(put(tmp_path, files), ("task-1.py",)))
+    assert [found[name].read() for name in ("ada", "ben")] == [b"this", b"again"]
+
+
 def test_copies_and_older_versions_beside_a_file_do_no_harm(tmp_path: Path) -> None:
     put(
         tmp_path,

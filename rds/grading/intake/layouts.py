@@ -376,7 +376,7 @@ def _is_of_a_class(items: Sequence[Item], accepted: Sequence[str]) -> bool:
         at += 1
     alone = [item.name for item in handed_in if len(item.parts) == at]
     in_folders = {item.parts[at - 1] for item in handed_in if len(item.parts) > at}
-    is_one_s = any(without_number(name)[0] in accepted for name in alone)
+    is_one_s = any(without_number(name, accepted)[0] in accepted for name in alone)
     is_one_s |= bool(in_folders) and not alone and all(map(_is_part, in_folders))
     around = handed_in[0].parts[: at - 1]  # what the only one to hand in has in it says nothing of others
     is_one_s |= any(is_version(folder) or is_dated(folder) for folder in around)
