@@ -66,6 +66,13 @@ def test_students_are_found_by_identifier_address_and_name(tmp_path: Path) -> No
     assert name("Lovelace") == "" and name("ada") == "ada"
 
 
+def test_the_number_of_a_participant_in_moodle_is_no_student_s() -> None:
+    known = ClassList((Member("501", "Grace Hopper"), Member("900", "Ada Lovelace")))
+    about = {"name": "Ada Lovelace", "id": "501"}
+    found = [known.find("Ada Lovelace_501", about | {"platform": each}) for each in ("moodle", "canvas")]
+    assert [member.student for member in found if member] == ["900", "501"]
+
+
 def row(student: str, hour: int | None = None, **more: object) -> HandedIn:
     time = None if hour is None else datetime(2026, 1, 10, hour, tzinfo=UTC)
     return HandedIn(student, f"{student}.py", time=time, **more)  # type: ignore[arg-type]

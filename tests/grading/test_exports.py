@@ -276,6 +276,14 @@ def test_moodle_gradebook_is_filled_in_by_title(tmp_path: Path) -> None:
     assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["-", "26"]
 
 
+def test_the_number_of_a_participant_in_moodle_is_nobody_s_id_number(tmp_path: Path) -> None:
+    book = tmp_path / "grades.csv"
+    book.write_text("Full name,ID number,Assignment: Tracking (Real)\nAda Lovelace,900,-\nGrace Hopper,501,-\n")
+    ada = from_platform("moodle", "Ada Lovelace_501", id="501", name="Ada Lovelace")
+    done = exported(tmp_path, "moodle", [ada], ExportOptions(gradebook=book))
+    assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["26", "-"]
+
+
 def test_moodle_without_a_download_has_three_columns(tmp_path: Path) -> None:
     done = exported(tmp_path, "moodle", [grade("ada@x.edu"), grade("4711")])
     assert Path(done.files[0]).read_text().splitlines() == [

@@ -63,10 +63,12 @@ class ClassList:
     def find(self, student: str, source: Mapping[str, Any] | None = None) -> Member | None:
         """Who handed in as `student`, of whom an export says `source`; None where that is nobody, or several.
 
-        The identifier decides, then number, e-mail address and name.
+        The identifier decides, then number, e-mail address and name. The number of a participant in Moodle is that of
+        one assignment, and no student's.
         """
         about = source or {}
-        said = [student, *(str(about[key]) for key in ("sid", "id", "email") if about.get(key))]
+        keys = ("sid", "email") if about.get("platform") == "moodle" else ("sid", "id", "email")
+        said = [student, *(str(about[key]) for key in keys if about.get(key))]
         names = [str(about["name"])] if about.get("name") else [student]
         return (
             self._one(said, lambda each: each.student)
