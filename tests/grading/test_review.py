@@ -16,6 +16,8 @@ from rds.grading.assignment.assignment import read_assignment
 from rds.grading.assignment.late_rules import LateRules
 from rds.grading.batch.finished import read_finished
 from rds.grading.course.class_list import ClassList, Member
+from rds.grading.exports.export import export
+from rds.grading.exports.exported import ExportOptions
 from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Band, Grade, Status
 from rds.grading.review.applied import of_review, reviewed
@@ -83,6 +85,12 @@ def test_an_excused_student_has_no_score_and_is_in_no_gradebook(tmp_path: Path) 
     finished = read_finished(tmp_path / "out")
     assert [each.student for each in finished.to_hand_on] == ["ben"]
     assert [each.student for each in finished.excused] == ["ada"]
+    for to in ("gradescope", "prairielearn"):
+        export(tmp_path / "out", to, None, ExportOptions())
+        text = (tmp_path / "out" / to / "ada/results.json").read_text()
+        assert "excused" in text and "points" not in text and "score" not in json.loads(text)
+    page = (tmp_path / "out/students/ada/feedback.html").read_text()
+    assert "You are excused" in page and " of 30 points</p>" not in page
 
 
 def test_the_trail_only_grows_and_notices_what_was_taken_out(tmp_path: Path) -> None:

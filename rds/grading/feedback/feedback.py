@@ -148,9 +148,10 @@ def _advice(assignment: Assignment, grade: Grade, runs: Sequence[CaseRun]) -> st
 def _total(grade: Grade) -> str:
     if grade.status is Status.GRADER_ERROR:
         return f'<p class="verdict void"><strong>not graded yet</strong> {_WHAT_IT_MEANS[grade.status]}</p>'
-    parts = [f'<p class="total">{grade.score:.4g} of {grade.max_score:.4g} points</p>']
+    is_excused = grade.status is Status.EXCUSED
+    parts = [] if is_excused else [f'<p class="total">{grade.score:.4g} of {grade.max_score:.4g} points</p>']
     lost = grade.before_penalty - grade.score
-    if grade.late_days > 0.0:
+    if grade.late_days > 0.0 and not is_excused:
         said = f"Handed in {grade.late_days:.3g} days after the due time: "
         said += (
             f"{lost:.4g} of the {grade.before_penalty:.4g} points earned are lost."
