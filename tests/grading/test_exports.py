@@ -384,6 +384,9 @@ def test_refusals(tmp_path: Path) -> None:
         export(out, "canvas", None, ExportOptions(gradebook=book))
     with pytest.raises(InputError, match=r"rds grade run"):
         export(tmp_path, "nbgrader", None, NOTHING)
+    for points in (0.0, float("nan"), float("inf")):
+        with pytest.raises(InputError, match="must be a finite number above 0"):
+            export(out, "nbgrader", None, ExportOptions(points=points))
     (out / "students/ada/grade.json").write_text("{}")
     with pytest.raises(InputError, match="is not a grade"):
         export(out, "nbgrader", None, NOTHING)
