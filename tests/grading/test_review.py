@@ -24,7 +24,7 @@ from rds.grading.review.applied import of_review, reviewed
 from rds.grading.review.best import best
 from rds.grading.review.entries import FILE, Entry, Kind, Review, add, read_review
 from rds.grading.review.everyone import everyone
-from rds.grading.review.regrade import changes_of
+from rds.grading.review.regrade import _kept, changes_of
 from rds.grading.review.say import marks_table, read_marks, say
 from tests.grading.grades import batch_in, grade, score
 from tests.grading.made import RMS, SINE, assignment_in
@@ -191,6 +191,13 @@ def test_who_changes_is_told_with_the_reason(tmp_path: Path) -> None:
     assert (change.before, change.now) == (7.0, 10.0)
     assert change.why[0] == "rms: 6 → 8 points, because its bands are others (the same value, 0.23 mm)"
     assert "a new criterion" in change.why[1] or "no longer" in change.why[1]
+
+
+def test_what_was_no_student_s_fault_is_none_when_it_is_graded_again(tmp_path: Path) -> None:
+    statuses = {"ada": Status.OK, "ben": Status.GRADER_ERROR, "cy": Status.MISSING, "dan": Status.REFUSED}
+    before = read_finished(made(tmp_path, *(grade(name, status) for name, status in statuses.items())))
+    found = {row.student: row.status for row in _kept(before).rows}
+    assert found == statuses | {"ada": Status.GRADER_ERROR}  # whose file is gone
 
 
 def test_everyone_is_found_by_what_the_export_says() -> None:

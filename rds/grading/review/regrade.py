@@ -29,6 +29,8 @@ from rds.results import html
 from rds.results.report import page
 
 TABLE, PAGE = "changes.csv", "changes.html"
+_WITHOUT_FILE = (Status.MISSING, Status.REFUSED, Status.EXCUSED, Status.GRADER_ERROR)
+_LOST = f"its {CODE} is not in the earlier batch any more; put it back, and go on with --resume"
 
 
 @dataclass(frozen=True)
@@ -138,8 +140,9 @@ def _kept(before: Finished) -> Intake:
             name = name if name.endswith(".py") else CODE
             rows.append(replace(row, name=name, read=partial(read_regular, path, LARGEST)))
         else:
-            status = grade.status if grade.status in (Status.MISSING, Status.REFUSED) else Status.REFUSED
-            rows.append(replace(row, status=status, reason=grade.reason))
+            is_lost = grade.status not in _WITHOUT_FILE
+            status, reason = (Status.GRADER_ERROR, _LOST) if is_lost else (grade.status, grade.reason)
+            rows.append(replace(row, status=status, reason=reason))
     return Intake(str(before.record.get("layout", "kept")), tuple(rows))
 
 
