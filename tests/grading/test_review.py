@@ -183,6 +183,18 @@ def test_the_best_attempt_counts_with_what_was_said_of_it(tmp_path: Path) -> Non
     assert "2: 30 (counts)" in finished.grades[0].notes[-1]
 
 
+def test_a_grader_error_in_one_attempt_is_no_zero_beside_another(tmp_path: Path) -> None:
+    def batch(number: int, **statuses: Status) -> Path:
+        return made(tmp_path / str(number), *(grade(name, status) for name, status in statuses.items()))
+
+    first = batch(1, ada=Status.MISSING, ben=Status.OK)
+    second = batch(2, ada=Status.GRADER_ERROR, ben=Status.GRADER_ERROR)
+    (second / "batch.json").write_text((first / "batch.json").read_text())
+    ada, ben = best([first, second], tmp_path / "best").grades
+    assert (ada.status, ben.status) == (Status.GRADER_ERROR, Status.OK)
+    assert ben.notes[-1] == "Points of 2 attempts: 1: 26 (counts), 2: grader error."
+
+
 def test_who_changes_is_told_with_the_reason(tmp_path: Path) -> None:
     before = read_finished(made(tmp_path / "1", grade("ada", Status.OK, score(), score("old", 1.0))))
     new = (replace(score(points=8.0), value=0.23), score("new", 2.0))
