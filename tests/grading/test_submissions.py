@@ -383,6 +383,13 @@ def test_gradescope_metadata_that_is_none(tmp_path: Path, text: str) -> None:
         collect(put(tmp_path, {"submission_metadata.yml": text, "submission_1/controller.py": ""}), ACCEPTED)
 
 
+def test_gradescope_metadata_that_is_not_opened_is_told_to_who_grades(tmp_path: Path) -> None:
+    put(tmp_path, {"submission_1/controller.py": ""})
+    (tmp_path / "submission_metadata.yml").symlink_to(tmp_path / "elsewhere.yml")
+    with pytest.raises(InputError, match=r"submission_metadata\.yml: cannot be read: it is a link"):
+        collect(tmp_path, ACCEPTED)
+
+
 def test_times_of_the_instructor(tmp_path: Path) -> None:
     times = "student,timestamp\nada,2026-01-10T13:00:00\nben,2026-01-10T13:00:00Z\nJos\u00e9,2026-01-10T12:00:00\n"
     files = {"ada.py": "", "ben.py": "", "Jose\u0301.py": "", "timestamps.csv": times}  # as a Mac writes an accent

@@ -31,7 +31,6 @@ _PARTS = frozenset(
     {"code", "data", "doc", "docs", "lib", "notebooks", "old", "python", "source", "src", "test", "tests"}
 )
 _HANDED_IN, _DRAFTS = "Submitted files", "Working files"  # side by side in Teams
-_METADATA_LARGEST = 64 << 20  # bytes; Gradescope's holds all earlier results
 
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL)
 # students choose their names there, and files', and Moodle puts the number behind the name: of a folder the last counts
@@ -93,7 +92,7 @@ def sorted_out(
     items = [item for item in items if item is not times]
     metadata = next((item for item in items if item.parts == (METADATA,)), None)
     if metadata is not None:
-        submitters = read_metadata(metadata.read(_METADATA_LARGEST))
+        submitters = read_metadata(metadata)
         for item in items:
             if item is not metadata:
                 sorting.gradescope(item, submitters)
