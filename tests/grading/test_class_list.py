@@ -47,6 +47,7 @@ def test_a_list_is_read_and_written_as_it_is(tmp_path: Path) -> None:
         ("student,group\nada,ben\nben,ben\n", "a group and a student"),
         ("student,name\nada\n", "number of cells"),
         ("student\n", "no student"),
+        ('student,name\nada,"Ada' + "\n" * 140_000, "class.csv: line .*quotation mark that is not closed"),
     ],
 )
 def test_a_list_that_will_not_do_is_refused(tmp_path: Path, text: str, said: str) -> None:

@@ -115,7 +115,7 @@ def read_class_list(path: Path) -> ClassList:
         raise InputError(f"cannot be read: {error.strerror}; name the class list", str(path)) from error
     except UnicodeDecodeError as error:
         raise InputError("is no text in UTF-8; save it as CSV UTF-8", str(path)) from error
-    reader = rows_by_heading(text)
+    reader = rows_by_heading(text, str(path))
     columns = [name.strip() for name in reader.fieldnames or ()]
     if "student" not in columns or len(set(columns)) < len(columns) or not set(columns) <= set(COLUMNS):
         raise InputError(

@@ -57,7 +57,7 @@ def read_marks(path: Path, by: str, is_final: bool = False) -> list[Entry]:
         raise InputError(f"cannot be read: {error.strerror}; name the table of marks", str(path)) from error
     except UnicodeDecodeError as error:
         raise InputError("is no text in UTF-8; save it as CSV UTF-8", str(path)) from error
-    reader = rows_by_heading(text)
+    reader = rows_by_heading(text, str(path))
     if not {"student", "criterion"} <= set(reader.fieldnames or ()):
         raise InputError(
             f"must have the columns {', '.join(MARKS)}; --write-marks makes such a table", f"{path}: line 1"
