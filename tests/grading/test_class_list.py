@@ -67,6 +67,11 @@ def test_students_are_found_by_identifier_address_and_name(tmp_path: Path) -> No
     assert name("Lovelace") == "" and name("ada") == "ada"
 
 
+def test_a_german_spreadsheet_s_list_has_commas_in_its_numbers(tmp_path: Path) -> None:
+    found = listed(tmp_path, "student;extension_days;late_days\nada;1,5;3\n")
+    assert (found.members[0].extension_days, found.members[0].late_days) == (1.5, 3)
+
+
 def test_the_number_of_a_participant_in_moodle_is_no_student_s() -> None:
     known = ClassList((Member("501", "Grace Hopper"), Member("900", "Ada Lovelace")))
     about = {"name": "Ada Lovelace", "id": "501"}

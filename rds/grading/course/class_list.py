@@ -151,9 +151,9 @@ def _member(row: Mapping[str, str], place: str) -> Member:
 
 
 def days(text: str, key: str, place: str) -> float:
-    """A number of days, 0 to 366. InputError for anything else."""
+    """A number of days, 0 to 366, with a point or a comma in it. InputError for anything else."""
     try:
-        value = float(text)
+        value = float(text.replace(",", "."))
     except ValueError:
         value = float("nan")
     if not (isfinite(value) and 0.0 <= value <= _MOST_DAYS):
