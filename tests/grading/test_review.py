@@ -203,6 +203,10 @@ def test_who_changes_is_told_with_the_reason(tmp_path: Path) -> None:
     assert (change.before, change.now) == (7.0, 10.0)
     assert change.why[0] == "rms: 6 → 8 points, because its bands are others (the same value, 0.23 mm)"
     assert "a new criterion" in change.why[1] or "no longer" in change.why[1]
+    unknown = replace(score(points=2.0), value=None, band=Band.REVIEW)
+    before = read_finished(made(tmp_path / "3", grade("ada", Status.OK, unknown)))
+    (change,) = changes_of(before, read_finished(made(tmp_path / "4", grade("ada"))))
+    assert change.why[0].endswith("because its value was not measured and is 0.23 mm")
 
 
 def test_what_was_no_student_s_fault_is_none_when_it_is_graded_again(tmp_path: Path) -> None:

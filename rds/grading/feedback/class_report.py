@@ -11,7 +11,7 @@ from urllib.parse import quote
 from rds.grading.batch.grades_table import criteria_of
 from rds.grading.feedback import histogram
 from rds.grading.feedback.plain_text import isolated, one_line
-from rds.grading.grade import Band, CriterionScore, Grade, Status
+from rds.grading.grade import Band, CriterionScore, Grade, Status, with_unit
 from rds.grading.review.applied import is_changed, of_review
 from rds.grading.review.entries import Kind, Review
 from rds.grading.review.everyone import SECTION
@@ -120,7 +120,7 @@ def _summary(graded: Sequence[Grade]) -> str:
         of = scores[criterion.name]
         counts = Counter(score.band for score in of)
         values = [score.value for score in of if score.value is not None]
-        middle = f"{median(values):.4g} {criterion.unit}".rstrip() if values else None
+        middle = with_unit(median(values), criterion.unit) if values else None
         row = [criterion.title, *_statistics([score.score for score in of]), criterion.max_score]
         rows.append([*row, middle, counts[Band.FULL], counts[Band.NONE]])
     columns = ["", "mean", "median", "lowest", "highest", "of points", "median value", "with full points", "with none"]

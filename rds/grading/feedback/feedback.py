@@ -18,7 +18,7 @@ from rds.grading.feedback import band_bar, histogram
 from rds.grading.feedback.advice import advice
 from rds.grading.feedback.feedback_plots import case_picture
 from rds.grading.feedback.plain_text import isolated, one_line, plain
-from rds.grading.grade import Band, CriterionScore, Grade, Status
+from rds.grading.grade import Band, CriterionScore, Grade, Status, with_unit
 from rds.results.report import page
 
 LEAST_CLASS = 10  # students: of fewer, a distribution would tell whose points they are
@@ -188,7 +188,7 @@ def _criterion(score: CriterionScore, criterion: Criterion | None, is_shown: boo
     )
     if not is_shown:
         return f'<div class="criterion"><div>{head} · hidden: its value is not shown</p></div></div>'
-    value = "" if score.value is None else f" · {_number(score.value, score.unit)}"
+    value = "" if score.value is None else f" · {escape(with_unit(score.value, score.unit))}"
     bar = "" if criterion is None else band_bar.band_bar(criterion.bands, score.value, score.unit)
     return (
         f'<div class="criterion"><div>{head}{value}</p><p>{escape(one_line(score.sentence, 1000))}</p></div>'
@@ -227,7 +227,3 @@ def _notes(grade: Grade) -> str:
     if grade.sha256:
         parts.append(f'<p class="note">SHA-256 of the file that was graded: {escape(grade.sha256)}</p>')
     return f"<section>{head}{''.join(parts)}</section>" if parts else ""
-
-
-def _number(value: float, unit: str) -> str:
-    return escape(f"{value:.4g} {unit}".rstrip() if unit != "1" else f"{value:.4g}")

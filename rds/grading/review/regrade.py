@@ -18,7 +18,7 @@ from rds.grading.batch.run import BatchOptions, grade_all
 from rds.grading.batch.work import CODE
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.feedback.plain_text import cell, csv_line, one_line
-from rds.grading.grade import CriterionScore, Grade, Status
+from rds.grading.grade import CriterionScore, Grade, Status, with_unit
 from rds.grading.intake import HandedIn, Intake
 from rds.grading.intake.folders import read_regular
 from rds.grading.review.entries import FILE as REVIEW
@@ -112,18 +112,17 @@ def _why(was: Grade, now: Grade) -> list[str]:
 
 def _cause(old: CriterionScore, new: CriterionScore) -> str:
     """What differs, the deepest cause first: the value, what it is worth, a gate, else the bands."""
-    unit = "" if new.unit == "1" else f" {new.unit}"
     if old.value != new.value:
-        return f"because its value was {_value(old)}{unit} and is {_value(new)}{unit}"
+        return f"because its value was {_value(old)} and is {_value(new)}"
     if old.max_score != new.max_score:
         return f"because it was worth {old.max_score:g} points and is worth {new.max_score:g}"
     if old.gate != new.gate:
         return f"because of the gate {new.gate}" if new.gate else f"because the gate {old.gate} takes nothing now"
-    return f"because its bands are others (the same value, {_value(new)}{unit})"
+    return f"because its bands are others (the same value, {_value(new)})"
 
 
 def _value(score: CriterionScore) -> str:
-    return "not measured" if score.value is None else f"{score.value:.4g}"
+    return "not measured" if score.value is None else with_unit(score.value, score.unit)
 
 
 def _kept(before: Finished) -> Intake:

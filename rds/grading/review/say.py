@@ -8,6 +8,7 @@ from pathlib import Path
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished, read_finished
 from rds.grading.feedback.plain_text import cell, csv_line, uncell
+from rds.grading.grade import with_unit
 from rds.grading.review.entries import Entry, Kind, add
 from rds.grading.review.publish import assignment_of, publish
 from rds.grading.table_text import rows_by_heading
@@ -83,12 +84,11 @@ def read_marks(path: Path, by: str, is_final: bool = False) -> list[Entry]:
 
 
 def marks_table(finished: Finished) -> bytes:
-    """A table for a grader to fill in: a line for each student and criterion, with what was measured in its last "
-    "columns."""
+    """A table for a grader to fill in: a line for each student and criterion, in its last columns what was measured."""
     rows: list[Iterable[str]] = [(*MARKS, "measured points", "of", "measured")]
     for grade in finished.grades:
         for score in grade.criteria:
-            value = "" if score.value is None else f"{score.value:.6g} {score.unit}".strip()
+            value = "" if score.value is None else with_unit(score.value, score.unit, 6)
             rows.append(
                 (grade.student, score.name, "", "", "", f"{score.score:g}", f"{score.max_score:g}", value or score.band)
             )
