@@ -233,6 +233,14 @@ def test_the_command_says_what_waits_and_refuses_half_a_sentence(tmp_path: Path)
     assert "could not be" in run(app, ["grade", "review", str(out)]).output
     assert run(app, ["grade", "review", str(out), "--points", "3"]).exit_code == 2
     assert run(app, ["grade", "review", str(out), "--student", "ada"]).exit_code == 2
+    for words, said in (
+        (["--student", "ada", "--criterion", "rms", "--excuse"], "--criterion has no meaning with --excuse"),
+        (["--student", "ada", "--undo", "1"], "--student has no meaning with --undo"),
+        (["--marks", str(out / "grades.csv"), "--why", "late"], "--why has no meaning with --marks"),
+        (["--student", "ada", "--points", "1", "--undo", "1"], "one thing at a time"),
+    ):
+        done = run(app, ["grade", "review", str(out), *words])
+        assert done.exit_code == 2 and said in done.output
     words = ["--student", "ada", "--criterion", "rms", "--points", "3", "--by", "ann"]
     assert run(app, ["grade", "review", str(out), *words]).exit_code == 0
     assert "nothing waits" in run(app, ["grade", "review", str(out)]).output
