@@ -59,7 +59,8 @@ def analyse(
         typer.Option(help="With --measured: each cycle's delays, a trace for \\[network], FILE.csv."),
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Write the timeline and response times, or curves, as a PNG.")
+        Path | None,
+        typer.Option(help="Write the timeline and response times, or curves, as a picture: png, svg or pdf."),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -47,6 +47,7 @@ def results_folder(out: Path | None) -> Path | None:
     return folder
 
 
+PICTURES = ("png", "svg", "pdf")
 RESULT_FILES = (".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf", ".svg", ".xlsx", ".txt", ".dat")
 _Shared = Annotated[bool, typer.Option("--shared", help="Let your group read what is written; else only you can.")]
 
@@ -216,6 +217,24 @@ def explain(result: Any, is_shown: bool = False, in_full: bool = False) -> None:
         typer.echo(f"rds: the verdict on the timing rests on this: {evidence}", err=True)
     for note in result.meta.get("notes", ()):
         typer.echo(f"rds: note: {note}", err=True)
+
+
+def picture_kind(path: Path) -> str:
+    """The kind of picture that a file's name says. InputError for one that is not drawn."""
+    from rds.core.errors import InputError
+
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in PICTURES:
+        raise InputError("what kind of picture is that? end its name with .png, .svg or .pdf", str(path))
+    return kind
+
+
+def save_picture(figure: Any, path: Path) -> None:
+    """Whole or not at all."""
+    from rds.core.atomic import write_files
+
+    kind = picture_kind(path)
+    write_files({path: lambda stream: figure.savefig(stream, format=kind)})
 
 
 def print_json(value: Any) -> None:

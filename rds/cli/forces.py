@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, writes_files
+from rds.cli.common import Json, print_json, progress_bars, refusals, save_picture, writes_files
 from rds.cli.nc_options import MaxJumps, Parameters, Tools, With, setup
 
 
@@ -71,8 +71,6 @@ def forces(
             prepared = prepare(program, of, setup(tools, parameters, with_, max_jumps), progress=bar("check"))
         found = program_forces(prepared, of, made)
         if out is not None:
-            from rds.cli.nc import save_picture
-
             save_picture(picture(found), out)
     worst = found.worst
     told = found.to_json()
