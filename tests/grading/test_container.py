@@ -12,6 +12,7 @@ import pytest
 from rds.core.errors import InputError
 from rds.grading.container import container
 from rds.grading.sandbox.requirements import _remedy
+from tests.grading.grades import batch_in, grade
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
 
 WITHOUT_UNIX = """
@@ -43,6 +44,12 @@ def test_ones_own_file_is_tried_where_there_is_no_unix(tmp_path: Path) -> None:
     assert done.returncode == 2 and "--trust-my-file" in done.stderr and "Traceback" not in done.stderr
     done = without_unix("platform", "run", str(task), str(task), "-o", str(tmp_path / "out"))
     assert done.returncode == 2 and "--container" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_what_a_container_has_graded_is_exported_where_there_is_no_unix(tmp_path: Path) -> None:
+    out = batch_in(tmp_path / "out", [grade("ada")])
+    done = without_unix("", "export", str(out), "--to", "moodle")
+    assert done.returncode == 0 and "1 students" in done.stdout, done.stderr
 
 
 def test_the_container_reads_what_it_grades_and_writes_one_folder(tmp_path: Path) -> None:
