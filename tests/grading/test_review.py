@@ -226,6 +226,18 @@ def test_everyone_is_found_by_what_the_export_says() -> None:
     assert counting.details["section"] == "A" and counting.score > measured.score
 
 
+def test_a_user_without_a_name_gives_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nobody() -> str:
+        raise KeyError("getpwuid(): uid not found: 1000")
+
+    monkeypatch.setattr("getpass.getuser", nobody)
+    out = str(made(tmp_path))
+    run = CliRunner().invoke
+    assert run(app, ["grade", "review", out]).exit_code == 0
+    said = run(app, ["grade", "review", out, "--student", "ada", "--comment", "x"])
+    assert said.exit_code == 2 and "give --by NAME" in said.output
+
+
 def test_the_command_says_what_waits_and_refuses_half_a_sentence(tmp_path: Path) -> None:
     unknown = replace(score(), band=Band.REVIEW, value=None)
     out = made(tmp_path, grade("ada", Status.OK, unknown))
