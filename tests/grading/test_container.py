@@ -10,7 +10,10 @@ from pathlib import Path
 import pytest
 
 from rds.core.errors import InputError
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.batch.finished import read_finished
 from rds.grading.container import container
+from rds.grading.review.publish import assignment_of
 from rds.grading.sandbox.requirements import _remedy
 from tests.grading.grades import batch_in, grade
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
@@ -115,6 +118,23 @@ def test_the_image_is_made_of_this_copy_and_what_grading_requires(tmp_path: Path
     names = {line.partition(">")[0].partition("[")[0] for line in (tmp_path / "requirements.txt").read_text().split()}
     assert {"numpy", "scipy", "control", "pyarrow", "pyseccomp", "nbformat"} <= names
     assert not {"jupyterlab", "pytest", "mini-cnc-rds"} & names
+
+
+def test_the_record_has_the_assignment_s_place_and_not_the_container_s(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task, out = assignment_in(tmp_path / "task", HEAD + SINE + RMS), tmp_path / "out"
+    record = {"folder": "/assignment/task", "assignment": read_assignment(task).sha256}
+
+    def grades(words: list[str]) -> subprocess.CompletedProcess[str]:
+        batch_in(out, [grade("ada")], **record)
+        return subprocess.CompletedProcess(words, 0)
+
+    monkeypatch.setattr(container, "program", lambda: "docker")
+    monkeypatch.setattr(container, "build", lambda name: "rds-grader:1")
+    monkeypatch.setattr(container.subprocess, "run", grades)
+    assert container.run_in_container(task, task, out, []) == 0
+    assert assignment_of(read_finished(out)).folder == task
 
 
 def test_without_a_program_for_containers_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
