@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
 from rds.grading.batch.finished import read_finished
@@ -118,6 +120,20 @@ def test_the_image_is_made_of_this_copy_and_what_grading_requires(tmp_path: Path
     names = {line.partition(">")[0].partition("[")[0] for line in (tmp_path / "requirements.txt").read_text().split()}
     assert {"numpy", "scipy", "control", "pyarrow", "pyseccomp", "nbformat"} <= names
     assert not {"jupyterlab", "pytest", "mini-cnc-rds"} & names
+
+
+def test_no_option_of_the_command_is_lost_on_the_way_into_the_container(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[list[str]] = []
+    monkeypatch.setattr(container, "run_in_container", lambda a, s, out, options, mounted: asked.append(options) or 0)
+    monkeypatch.setenv("RDS_SHARED", "")  # put back afterwards, as the umask is not
+    monkeypatch.setattr("rds.cli.common.keep_process_private", lambda: None)
+    words = ["grade", "run", str(tmp_path), str(tmp_path), "-o", str(tmp_path / "out"), "--container"]
+    assert CliRunner().invoke(app, [*words, "--shared", "--jobs", "2", "--resume"]).exit_code == 0
+    assert asked == [["--jobs", "2", "--resume", "--shared"]]
+    done = CliRunner().invoke(app, [*words, "--tls-ca", "ca.pem"])
+    assert done.exit_code == 2 and "leave out --tls-ca" in done.output
 
 
 def test_the_record_has_the_assignment_s_place_and_not_the_container_s(
