@@ -104,7 +104,7 @@ def analyse(
         disturbed = Errors(errors or 1, interval) if errors or error_interval is not None else None
         if is_message_table(table := Path(machine)):
             words = {"--dialect": dialect != "rds", "--response-time": response_time, "--host-jitter": host_jitter}
-            if wrong := [name for name, value in (words | {"--fits": fits}).items() if value]:
+            if wrong := [name for name, value in (words | {"--fits": fits, "--units": units}).items() if value]:
                 raise InputError(f"{', '.join(wrong)} is for a machine, not for a message table; leave it out")
             rate = 1_000_000 if bitrate is None else bitrate
             _analyse_table(table, rate, sample_period, disturbed, measured, trace, plot, json)
