@@ -63,13 +63,13 @@ def run(
     try:
         if container:
             with refusals():
-                of_cluster = {
+                of_cluster: dict[str, object] = {
                     "--scheduler": scheduler,
+                    "--insecure-cluster": insecure_cluster or None,
                     "--tls-ca": tls_ca,
                     "--tls-cert": tls_cert,
                     "--tls-key": tls_key,
                 }
-                of_cluster["--insecure-cluster"] = insecure_cluster or None
                 if given := [option for option, value in of_cluster.items() if value is not None]:
                     raise InputError(f"--container grades on this computer alone; leave out {' and '.join(given)}")
                 raise typer.Exit(_in_container(assignment, submissions, out, jobs, class_list, against, resume, json))
