@@ -34,15 +34,13 @@ def class_page(
     *,
     seconds: Mapping[str, float] | None = None,
     similar: str = "",
-    missing: Sequence[str] = (),
     about: str = "",
     review: Review | None = None,
 ) -> Iterator[str]:
     """The page as HTML, piece by piece: a large class's need not have room in memory.
 
     `links` are the students' pages by identifier, as paths from this page; `seconds` is how long each submission took;
-    `similar` is HTML that points out submissions that are alike; `missing` are students without a grade; `review` is
-    what graders have said.
+    `similar` is HTML that points out submissions that are alike; `review` is what graders have said.
     """
     graded = [grade for grade in grades if grade.status not in (Status.GRADER_ERROR, Status.EXCUSED)]
     before, after = around(title)
@@ -50,7 +48,7 @@ def class_page(
     parts = (
         _STYLE,
         f'<header><h1>{escape(one_line(title))}</h1><p class="about">{escape(about)}</p></header>',
-        _first(grades, links, missing),
+        _first(grades, links),
         _summary(graded),
         _sections(graded),
         _distributions(graded),
@@ -63,15 +61,14 @@ def class_page(
     yield after
 
 
-def _first(grades: Sequence[Grade], links: Mapping[str, str], missing: Sequence[str]) -> str:
+def _first(grades: Sequence[Grade], links: Mapping[str, str]) -> str:
     """What the instructor has to look at: our own failures, and what could not be graded as it was meant."""
     parts = []
     ours = [grade.student for grade in grades if grade.status is Status.GRADER_ERROR]
-    again = [*ours, *(student for student in missing if student not in ours)]
-    if again:
-        names = ", ".join(isolated(student) for student in again)
+    if ours:
+        names = ", ".join(isolated(student) for student in ours)
         parts.append(
-            f'<p class="verdict missed"><strong>{len(again)} not graded</strong> by no fault of theirs; run the same '
+            f'<p class="verdict missed"><strong>{len(ours)} not graded</strong> by no fault of theirs; run the same '
             f"command again with --resume: {names}</p>"
         )
     review = [grade for grade in grades if grade.status is not Status.GRADER_ERROR and grade.for_review]

@@ -60,13 +60,11 @@ def feedback_page(
     grade: Grade,
     runs: Sequence[CaseRun] = (),
     solution: Sequence[CaseRun] = (),
-    *,
-    same_plants: bool = True,
 ) -> str:
     """The page of one student as HTML.
 
-    `runs` are the runs that the grade rests on, `solution` those of the reference solution; `same_plants` says whether
-    both were on the same plants. What is hidden is only shown if the assignment says `feedback = "all"`.
+    `runs` are the runs that the grade rests on, `solution` those of the reference solution, on plants of its own.
+    What is hidden is only shown if the assignment says `feedback = "all"`.
     """
     shows_all = assignment.feedback == "all"
     title = f"{assignment.title}: {one_line(grade.student, 80)}"
@@ -76,7 +74,7 @@ def feedback_page(
         _advice(assignment, grade, runs),
         _marked("criteria", criteria_part(assignment, grade)),
         _marked("class", ""),
-        _runs(assignment, runs, solution, shows_all, same_plants),
+        _runs(assignment, runs, solution, shows_all),
         _notes(grade),
     ]
     return page(title, "\n".join(filter(None, parts)))
@@ -196,9 +194,7 @@ def _criterion(score: CriterionScore, criterion: Criterion | None, is_shown: boo
     )
 
 
-def _runs(
-    assignment: Assignment, runs: Sequence[CaseRun], solution: Sequence[CaseRun], shows_all: bool, same_plants: bool
-) -> str:
+def _runs(assignment: Assignment, runs: Sequence[CaseRun], solution: Sequence[CaseRun], shows_all: bool) -> str:
     parts = []
     for case in assignment.cases:
         if not (shows_all or case.is_visible):
@@ -207,7 +203,7 @@ def _runs(
         beside = [run for run in solution if run.case == case.name]
         picture = case_picture(of_case, beside, case.title)
         if picture is not None:
-            has_own = beside and not same_plants and case.is_drawn
+            has_own = beside and case.is_drawn
             own = " The reference solution ran on a plant of its own." if has_own else ""
             caption = escape(picture.caption + own)
             parts.append(
