@@ -356,6 +356,15 @@ def test_one_student_may_be_one_file(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "results.json").read_text())["score"] == 26.0
 
 
+def test_the_folder_for_the_files_of_the_students_may_have_a_dot_in_its_name(tmp_path: Path) -> None:
+    out, place = batch_in(tmp_path / "out", [grade("ada"), grade("bob")]), tmp_path / "grades.2026"
+    with pytest.raises(InputError, match="have to be a folder"):
+        export(out, "gradescope", place, NOTHING)
+    place.mkdir()
+    assert len(export(out, "gradescope", place, NOTHING).files) == 2
+    assert (place / "bob/results.json").is_file()
+
+
 @pytest.mark.parametrize("to", GRADEBOOKS.names())
 def test_options_are_used_or_refused(to: str, tmp_path: Path) -> None:
     out = batch_in(tmp_path / "out", [grade("ada")])
