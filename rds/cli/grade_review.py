@@ -172,6 +172,9 @@ def late_days(
         finished = read_finished(out)
         if not finished.listed.members:
             raise InputError("has no class list; grade with --class FILE", str(out))
+        if all(member.late_days is None for member in finished.listed.members):
+            why = "has no late_days in its class list; what attempts spent is in the batch of each, not in their best"
+            raise InputError(why, str(out))
         spent: dict[str, int] = {}
         for grade in finished.grades:
             source = grade.details.get("source")

@@ -15,7 +15,7 @@ from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
 from rds.grading.assignment.late_rules import LateRules
 from rds.grading.batch.finished import read_finished
-from rds.grading.course.class_list import ClassList, Member
+from rds.grading.course.class_list import ClassList, Member, read_class_list
 from rds.grading.exports.export import export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.feedback.feedback import feedback_page
@@ -181,6 +181,18 @@ def test_the_best_attempt_counts_with_what_was_said_of_it(tmp_path: Path) -> Non
     page = (tmp_path / "best/students/ada/feedback.html").read_text()
     assert "30 of 30 points" in page and "good" in page
     assert "2: 30 (counts)" in finished.grades[0].notes[-1]
+
+
+def test_late_days_are_never_given_back_by_the_best_of_attempts(tmp_path: Path) -> None:
+    run, after = CliRunner().invoke, tmp_path / "next.csv"
+    first = made(tmp_path / "1", words="student,late_days\nada,3\nben,0\n")
+    second = made(tmp_path / "2", words="student,late_days\nada,3\nben,0\n")
+    (second / "batch.json").write_text((first / "batch.json").read_text())
+    best([first, second], tmp_path / "best")
+    done = run(app, ["grade", "late-days", str(tmp_path / "best"), "-o", str(after)])
+    assert done.exit_code == 2 and "in the batch of each" in done.output and not after.exists()
+    assert run(app, ["grade", "late-days", str(first), "-o", str(after)]).exit_code == 0
+    assert [member.late_days for member in read_class_list(after).members] == [3, 0]
 
 
 def test_a_grader_error_in_one_attempt_is_no_zero_beside_another(tmp_path: Path) -> None:
