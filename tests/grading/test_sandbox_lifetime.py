@@ -78,9 +78,10 @@ def test_a_cell_that_could_not_be_started_holds_nothing_open() -> None:
         def fork(self, _request: object, _fds: object) -> None:
             raise SandboxError("the warm interpreter is gone")
 
-    before = len(os.listdir("/proc/self/fd"))
+    supervisor, before = Supervisor(), len(os.listdir("/proc/self/fd"))
     with pytest.raises(SandboxError, match="is gone"):
-        Cell(Gone(), Budget(Limits()), Supervisor())  # type: ignore[arg-type]
+        Cell(Gone(), Budget(Limits()), supervisor)  # type: ignore[arg-type]
+    supervisor.close()
     assert len(os.listdir("/proc/self/fd")) == before
 
 
