@@ -93,6 +93,14 @@ def test_the_last_file_of_a_group_counts_and_nobody_is_forgotten(tmp_path: Path)
     assert set(rows["red"].source["handed_in_by"]) == {"ada", "ben"}
 
 
+def test_a_group_that_is_graded_again_keeps_what_the_export_says_of_each_member(tmp_path: Path) -> None:
+    ada = row("ada", 9, source={"id": "501"})
+    once = by_group(Intake("files", (ada, row("ben", 11))), listed(tmp_path))
+    assert by_group(once, listed(tmp_path)) == once
+    nothing = by_group(Intake("files", ()), listed(tmp_path))
+    assert by_group(nothing, listed(tmp_path)) == nothing
+
+
 def test_nobody_guesses_which_file_of_a_group_was_the_last(tmp_path: Path) -> None:
     found = by_group(Intake("files", (row("ada"), row("ben", 11))), listed(tmp_path))
     (red,) = (each for each in found.rows if each.student == "red")
