@@ -59,7 +59,8 @@ def analyse(
         typer.Option(help="With --measured: each cycle's delays, a trace for \\[network], FILE.csv."),
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Write the timeline and response times, or curves, as a PNG.")
+        Path | None,
+        typer.Option(help="Write the timeline and response times, or curves, as a picture: png, svg or pdf."),
     ] = None,
     json: Json = False,
 ) -> None:
@@ -103,7 +104,7 @@ def analyse(
         disturbed = Errors(errors or 1, interval) if errors or error_interval is not None else None
         if is_message_table(table := Path(machine)):
             words = {"--dialect": dialect != "rds", "--response-time": response_time, "--host-jitter": host_jitter}
-            if wrong := [name for name, value in (words | {"--fits": fits}).items() if value]:
+            if wrong := [name for name, value in (words | {"--fits": fits, "--units": units}).items() if value]:
                 raise InputError(f"{', '.join(wrong)} is for a machine, not for a message table; leave it out")
             rate = 1_000_000 if bitrate is None else bitrate
             _analyse_table(table, rate, sample_period, disturbed, measured, trace, plot, json)

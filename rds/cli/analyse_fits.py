@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rds.cli.common import print_json
+from rds.cli.common import print_json, save_picture
 from rds.core.errors import InputError
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from rds.bus.analysis.analysis_report import Analysis
     from rds.bus.analysis.measured import Measured
     from rds.machines import Machine
@@ -35,7 +33,7 @@ def show_serial(
     bauds = sorted({*serial_line.BAUDS, rate}) if baud is None else [rate]
     rows = serial_line.table(count, T, bauds)
     if plot is not None:
-        _save(plot, serial_line.plot(machine, T))
+        save_picture(serial_line.plot(machine, T), plot)
     asked = serial_line.fits(count, rate, T)[1]
     rest = serial_line.filling_time(count, rate)
     found = {
@@ -103,7 +101,7 @@ def draw(plot: Path, analysis: Analysis, measured: Measured | None = None) -> No
     """The timeline and response times of an analysis, and over them what was measured."""
     from rds.bus.analysis.analysis_plot import plot as draw_analysis
 
-    _save(plot, draw_analysis(analysis, measured))
+    save_picture(draw_analysis(analysis, measured), plot)
 
 
 def draw_can(
@@ -123,11 +121,4 @@ def draw_can(
         raise InputError(f"--fits --plot draws the curves of dialect rds, not of {dialect}; leave --fits or --plot out")
     from rds.bus.analysis.can_curves import plot as draw_curves
 
-    _save(plot, draw_curves(machine, machine.sample_period if period is None else period))
-
-
-def _save(plot: Path, picture: Figure) -> None:
-    from rds.core.atomic import write_files
-
-    kind = plot.suffix.removeprefix(".") or "png"
-    write_files({plot: lambda stream: picture.savefig(stream, format=kind)})
+    save_picture(draw_curves(machine, machine.sample_period if period is None else period), plot)

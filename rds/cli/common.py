@@ -12,7 +12,7 @@ import signal
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from functools import wraps
 from math import isfinite
@@ -47,6 +47,7 @@ def results_folder(out: Path | None) -> Path | None:
     return folder
 
 
+PICTURES = ("png", "svg", "pdf")
 RESULT_FILES = (".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf", ".svg", ".xlsx", ".txt", ".dat")
 _Shared = Annotated[bool, typer.Option("--shared", help="Let your group read what is written; else only you can.")]
 
@@ -216,6 +217,47 @@ def explain(result: Any, is_shown: bool = False, in_full: bool = False) -> None:
         typer.echo(f"rds: the verdict on the timing rests on this: {evidence}", err=True)
     for note in result.meta.get("notes", ()):
         typer.echo(f"rds: note: {note}", err=True)
+
+
+def named_values(given: Iterable[str], option: str, example: str, read: Callable[[str], Any] = float) -> dict[str, Any]:
+    """The values of an option that is given as NAME=VALUE, once or several times, by name.
+
+    `read` takes a value's text; ValueError where it cannot. InputError for another form, and for a name given twice.
+    """
+    from rds.core.errors import InputError
+
+    texts: dict[str, str] = {}
+    found: dict[str, Any] = {}
+    for text in given:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if name in found:
+            raise InputError(f"{option} {name} is given twice, {texts[name]} and {value}; give it once")
+        try:
+            if not (name and equals):
+                raise ValueError
+            texts[name], found[name] = value, read(value)
+        except ValueError:
+            what = "NAME=VALUE with a number" if read is float else "NAME=VALUE"
+            raise InputError(f"{option} {text!r} must be {what}, as in {option} {example}") from None
+    return found
+
+
+def picture_kind(path: Path) -> str:
+    """The kind of picture that a file's name says. InputError for one that is not drawn."""
+    from rds.core.errors import InputError
+
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in PICTURES:
+        raise InputError("what kind of picture is that? end its name with .png, .svg or .pdf", str(path))
+    return kind
+
+
+def save_picture(figure: Any, path: Path) -> None:
+    """Whole or not at all."""
+    from rds.core.atomic import write_files
+
+    kind = picture_kind(path)
+    write_files({path: lambda stream: figure.savefig(stream, format=kind)})
 
 
 def print_json(value: Any) -> None:

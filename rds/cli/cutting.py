@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, refusals, writes_files
+from rds.cli.common import Json, named_values, print_json, refusals, writes_files
 
 app = typer.Typer(no_args_is_help=True, help="Cutting forces: coefficients, fitted ones, parameters of a cut.")
 Coefficients = Annotated[
@@ -140,7 +140,7 @@ def fit(
     with refusals():
         from rds.cli.force_table import fit_table, fit_toml
 
-        found = fit_table(data, fix or [])
+        found = fit_table(data, named_values(fix or (), "--fix", "speed=0"))
         if out is not None:
             from rds.core.private_files import write_private
 

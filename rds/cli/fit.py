@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
+from rds.cli.common import Json, named_values, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.logs import read_logs
 from rds.identification.structures import INVERSE_DYNAMICS, SIMULATION_ERROR
 
@@ -109,11 +109,11 @@ def _options(
     """The method's options. InputError for what it does not take."""
     from rds.core.errors import InputError
 
-    fixed = _values(fix, "--fix")
+    fixed = named_values(fix, "--fix", "tau=0.01")
     if free is not None:
         fixed |= _others(made, free, fixed)
-    options: dict[str, Any] = dict(_values(set_, "--set"))
-    begun = _values(start, "--start")
+    options: dict[str, Any] = named_values(set_, "--set", "cutoff=50")
+    begun = named_values(start, "--start", "tau=0.01")
     chosen = method or made.default_method
     if chosen != SIMULATION_ERROR:
         for word, given, of in (("--fix or --free", fixed, (INVERSE_DYNAMICS,)), ("--start", begun, ())):
@@ -143,24 +143,6 @@ def _others(made: Structure, free: str, fixed: dict[str, float]) -> dict[str, fl
         raise InputError("--free names no parameter; give names with commas between them")
     params = load_student(made.name).params
     return {name: float(params[name]) for name in made.parameters if name not in names and name not in fixed}
-
-
-def _values(given: list[str], word: str) -> dict[str, float]:
-    from rds.core.errors import InputError
-
-    values: dict[str, float] = {}
-    for text in given:
-        name, equals, value = text.partition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            equals = ""
-        if not name.strip() or not equals:
-            raise InputError(f"{word} {text!r} must be NAME=VALUE with a number, as in {word} tau=0.01")
-        if name.strip() in values:
-            raise InputError(f"{word} {name.strip()} is given twice; give it once")
-        values[name.strip()] = number
-    return values
 
 
 def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:

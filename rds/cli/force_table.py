@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,8 @@ from rds.results.reports.reading import read_columns
 UNITS = {"force": "N", "depth": "mm", "speed": "m/min", "feed": "mm"}
 
 
-def fit_table(path: str | Path, fix: Sequence[str] = ()) -> ForceFit:
-    """The coefficients from the columns force and some of depth, speed, feed of a CSV file; `fix` as "NAME=EXPONENT".
+def fit_table(path: str | Path, fix: Mapping[str, float] | None = None) -> ForceFit:
+    """The coefficients from the columns force and some of depth, speed, feed of a CSV file; `fix` are known exponents.
 
     Raises InputError, with file, line and column, for a table that has no force, another unit, or cells that are no
     numbers, and as `fit_force` does.
@@ -31,7 +31,7 @@ def fit_table(path: str | Path, fix: Sequence[str] = ()) -> ForceFit:
             raise InputError(f"column {name!r} is in {column.unit}; give it in {UNITS[name]}", str(path))
     numbers = {name: np.array(column.numbers()) for name, column in columns.items()}
     try:
-        return fit_force(numbers.pop("force"), numbers, dict(map(_fixed, fix)))
+        return fit_force(numbers.pop("force"), numbers, dict(fix or {}))
     except InputError as error:
         raise InputError(str(error), str(path)) from None
 
@@ -43,13 +43,3 @@ def fit_toml(found: ForceFit, name: str, material: str, tool: str, data: str) ->
     values = {key: found.values[key] for key in ("K", *NAMES)}
     table = {name: {"material": material, "tool": tool, **values, "source": f"fitted to {data}"}}
     return toml_text(table, comment).encode()
-
-
-def _fixed(text: str) -> tuple[str, float]:
-    name, equals, value = text.partition("=")
-    try:
-        if equals:
-            return name.strip(), float(value)
-    except ValueError:
-        pass
-    raise InputError(f"--fix {text!r} must be NAME=EXPONENT, as in speed=0")

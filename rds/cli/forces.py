@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, writes_files
+from rds.cli.common import Json, named_values, print_json, progress_bars, refusals, save_picture, writes_files
 from rds.cli.nc_options import MaxJumps, Parameters, Tools, With, setup
 
 
@@ -62,17 +62,16 @@ def forces(
         words |= {"direction": direction, "width": width}
         given: dict[str, Any] = {key: value for key, value in words.items() if value is not None}
         if limit:
-            given["limits"] = dict(map(_pair, limit))
+            given["limits"] = named_values(limit, "--limit", "force=40")
         if cut is not None and given:
-            raise InputError(f"--{next(iter(given)).rstrip('s')} is said in {cut}, too, or not; write it there")
+            option = next(iter(given)) if "limits" not in given else "limit"
+            raise InputError(f"--{option} belongs into the file of --cut, {cut}; write it there, or leave --cut out")
         made = read_cut(cut) if cut is not None else cut_of(given)
         of = load_machine(machine)
         with progress_bars() as bar:
             prepared = prepare(program, of, setup(tools, parameters, with_, max_jumps), progress=bar("check"))
         found = program_forces(prepared, of, made)
         if out is not None:
-            from rds.cli.nc import save_picture
-
             save_picture(picture(found), out)
     worst = found.worst
     told = found.to_json()
@@ -110,16 +109,6 @@ def forces(
 
 def _called(name: str) -> str:
     return {"force": "cutting force", "power": "spindle's power"}.get(name, f"joint {name}")
-
-
-def _pair(text: str) -> tuple[str, float]:
-    from rds.core.errors import InputError
-
-    name, _, value = text.partition("=")
-    try:
-        return name, float(value)
-    except ValueError:
-        raise InputError(f"--limit {text!r} must be NAME=VALUE with a number, as in --limit force=40") from None
 
 
 def power(

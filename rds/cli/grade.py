@@ -165,11 +165,11 @@ def _show_self(found: SelfCheck) -> None:
 
 
 def _value(line: Line) -> str:
-    from rds.cli.console import number
+    from rds.grading.grade import with_unit
 
     if not line.is_visible:
         return "hidden"
-    return number(line.value) if line.unit == "1" or line.value is None else f"{number(line.value)} {line.unit}"
+    return "–" if line.value is None else with_unit(line.value, line.unit)
 
 
 def _show_check(title: str, found: AssignmentCheck) -> None:

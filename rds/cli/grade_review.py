@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from rds.grading.review.entries import Entry
 
 _Out = Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `rds grade run -o` made.")]
+_WORDS = ("--student", "--section", "--criterion", "--comment")
+_WITHOUT = {"--excuse": ("--criterion",), "--extend-days": ("--criterion",), "--undo": _WORDS}
+_WITHOUT |= {"--marks": (*_WORDS, "--why")}  # the table has its own
 _New = Annotated[Path, typer.Option("--out", "-o", help="The new folder.")]
 
 
@@ -52,7 +55,15 @@ def review(
         from rds.grading.review.entries import Entry, Kind
         from rds.grading.review.say import marks_table, read_marks, say
 
-        who = by or getpass.getuser()
+        ways = {"--points": points, "--excuse": excuse or None, "--extend-days": extend_days, "--undo": undo}
+        chosen = [way for way, given in (ways | {"--marks": marks}).items() if given is not None]
+        if len(chosen) > 1:
+            raise InputError(f"{' and '.join(chosen)} are given; say one thing at a time")
+        words = {"--student": student, "--section": section, "--criterion": criterion, "--comment": comment}
+        for option in _WITHOUT.get("".join(chosen), ()):
+            if (words | {"--why": why})[option]:
+                raise InputError(f"{option} has no meaning with {chosen[0]}; leave it out")
+        who = by or _account()
         plain = Entry(Kind.COMMENT, who, student, section, comment=comment, why=why)
         said: list[Entry] = []
         if points is not None:
@@ -67,8 +78,6 @@ def review(
             said += read_marks(marks, who, final)
         if not said and (comment or why):
             said.append(replace(plain, criterion=criterion))
-        if len(said) > 1 and marks is None:
-            raise InputError("say one thing at a time: points, an excuse, an extension, or an undo")
         if said and marks is None and undo is None and bool(student) == bool(section):
             raise InputError("say whom it is about: --student NAME, or --section NAME")
         if final and not any(each.kind is Kind.POINTS for each in said):
@@ -163,6 +172,9 @@ def late_days(
         finished = read_finished(out)
         if not finished.listed.members:
             raise InputError("has no class list; grade with --class FILE", str(out))
+        if all(member.late_days is None for member in finished.listed.members):
+            why = "has no late_days in its class list; what attempts spent is in the batch of each, not in their best"
+            raise InputError(why, str(out))
         spent: dict[str, int] = {}
         for grade in finished.grades:
             source = grade.details.get("source")
@@ -174,6 +186,14 @@ def late_days(
         print_json({"spent": spent, "file": str(file)})
     else:
         typer.echo(f"{sum(spent.values())} late days are spent: wrote {file}")
+
+
+def _account() -> str:
+    """The name of the user's account; empty where the system knows none, as in a container: then --by has to say it."""
+    try:
+        return getpass.getuser()
+    except (ImportError, KeyError, OSError):
+        return ""
 
 
 def _announce(text: str) -> None:

@@ -24,7 +24,7 @@ from rds.cli.common import (
 )
 from rds.cli.grade import needs_sandbox
 from rds.core.errors import InputError
-from rds.core.private_files import keep_process_private
+from rds.core.private_files import is_shared, keep_process_private
 
 if TYPE_CHECKING:
     from rds.core.parallel.process import WorkerProcess
@@ -63,8 +63,15 @@ def run(
     try:
         if container:
             with refusals():
-                if scheduler is not None:
-                    raise InputError("--container grades on this computer alone; leave out --scheduler")
+                of_cluster: dict[str, object] = {
+                    "--scheduler": scheduler,
+                    "--insecure-cluster": insecure_cluster or None,
+                    "--tls-ca": tls_ca,
+                    "--tls-cert": tls_cert,
+                    "--tls-key": tls_key,
+                }
+                if given := [option for option, value in of_cluster.items() if value is not None]:
+                    raise InputError(f"--container grades on this computer alone; leave out {' and '.join(given)}")
                 raise typer.Exit(_in_container(assignment, submissions, out, jobs, class_list, against, resume, json))
         with refusals(), stdout_kept(json), ends_as_ctrl_c():
             needs_sandbox()
@@ -129,6 +136,7 @@ def _in_container(
     from rds.grading.container.container import run_in_container
 
     options = [*([] if jobs is None else ["--jobs", str(jobs)]), *["--resume"] * resume, *["--json"] * json]
+    options += ["--shared"] * is_shared()
     mounted = [("--class", class_list)] if class_list is not None else []
     return run_in_container(
         assignment, submissions, out, options, mounted + [("--against", path) for path in against or ()]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json as json_text
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, NoReturn
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
+from rds.cli.common import Json, named_values, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, Tools, With, setup
 
 if TYPE_CHECKING:
@@ -147,8 +148,7 @@ def _method(name: str, options: list[str] | None, T: float, notes: list[str]) ->
     from rds.interpolators import LIBRARY
     from rds.interpolators.interpolator import find_interpolator
 
-    given = dict(option_of(text) for text in options or ())
-    found = find_interpolator(name, given)
+    found = find_interpolator(name, options_of(options or ()))
     if name not in LIBRARY.modules:
         notes += _check_student(name, T)
     return found
@@ -169,17 +169,16 @@ def _check_student(file: str, T: float) -> list[str]:
     return warnings
 
 
-def option_of(text: str) -> tuple[str, Any]:
-    """NAME=VALUE as a name and a number, list or text."""
-    from rds.core.errors import InputError
+def options_of(texts: Iterable[str]) -> dict[str, Any]:
+    """The values of --option by name: numbers, lists or texts."""
 
-    name, equals, value = text.partition("=")
-    if not equals or not name:
-        raise InputError(f"--option {text!r} must be NAME=VALUE, as in --option blu=0.001")
-    try:
-        return name.strip(), json_text.loads(value)
-    except ValueError:
-        return name.strip(), value
+    def read(value: str) -> Any:
+        try:
+            return json_text.loads(value)
+        except ValueError:
+            return value
+
+    return named_values(texts, "--option", "blu=0.001", read)
 
 
 def acceleration_of(

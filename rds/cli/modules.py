@@ -13,7 +13,7 @@ import typer
 
 from rds.bus.modules.oacs.pid import MEANINGS
 from rds.cli.buses import Bitrate, Channel, Experiment, Interface, chosen_bus
-from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, writes_files
+from rds.cli.common import Json, ends_as_ctrl_c, named_values, print_json, progress_bars, refusals, writes_files
 
 module_app = typer.Typer(
     no_args_is_help=True, help="One distributed module (oacs dialect): information, tuning, motions, recorded steps."
@@ -96,7 +96,7 @@ def tune(
 ) -> None:
     """Select P, PI or PID and set gains and limits; without options, show what is in force."""
     with _module(context, (interface, channel, experiment, bitrate)) as module:
-        parameters = _pairs(set_ or ())
+        parameters = _parameters(set_ or ())
         if from_step is not None:
             controller = controller or module.tuning().controller.name  # the gains of another one would not fit it
             parameters = _gains(from_step, controller) | parameters
@@ -120,27 +120,11 @@ def _gains(path: Path, controller: str) -> dict[str, float]:
     return gains_from_step(result, result.axes[0], controller)._asdict()
 
 
-def _pairs(texts: Sequence[str]) -> dict[str, float]:
-    """The values of --set by name; InputError for a name given twice."""
-    found: dict[str, float] = {}
-    for text in texts:
-        name, value = _pair(text)
-        if name in found:
-            raise _refused(f"--set {name} is given twice, {found[name]:g} and {value:g}; give it once")
-        found[name] = value
-    return found
-
-
-def _pair(text: str) -> tuple[str, float]:
-    name, equals, value = text.partition("=")
-    if name.lower() == "controller":
-        raise _refused(f"--set {text}: the controller is chosen by --controller PI or --controller PID")
-    try:
-        if equals and name:
-            return name, float(value)
-    except ValueError:
-        pass
-    raise _refused(f"--set {text!r} must be NAME=VALUE with a number, as in --set Kp=2.5")
+def _parameters(texts: Sequence[str]) -> dict[str, float]:
+    """The values of --set by name."""
+    if chosen := [text for text in texts if text.partition("=")[0].lower() == "controller"]:
+        raise _refused(f"--set {chosen[0]}: the controller is chosen by --controller PI or --controller PID")
+    return named_values(texts, "--set", "Kp=2.5")
 
 
 @module_app.command()

@@ -14,7 +14,7 @@ import typer
 
 from rds.cli import nc_bundled, nc_cut, nc_job, nc_make, nc_methods, nc_operate, nc_run, nc_step
 from rds.cli.canon import print_canon
-from rds.cli.common import Json, declared, print_json, progress_bars, refusals, writes_files
+from rds.cli.common import Json, declared, print_json, progress_bars, refusals, save_picture, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
 from rds.core.shared_quantities import SAMPLE_PERIOD
 
@@ -30,8 +30,6 @@ nc_make.app.command()(nc_job.job)
 app.add_typer(nc_make.app, name="make")
 for _command in (nc_run.run, nc_operate.operate, nc_methods.methods, nc_bundled.bundled, nc_cut.cut, nc_step.step):
     app.command()(_command)
-
-PICTURES = ("png", "svg", "pdf")
 
 
 @app.command()
@@ -201,17 +199,6 @@ def plot(
         print_json({**result.to_json(), "picture": str(path)})
     else:
         typer.echo(f"picture: {path}")
-
-
-def save_picture(figure: Any, path: Path) -> None:
-    """Whole or not at all."""
-    from rds.core.atomic import write_files
-    from rds.core.errors import InputError
-
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in PICTURES:
-        raise InputError("what kind of picture is that? end its name with .png, .svg or .pdf", str(path))
-    write_files({path: lambda stream: figure.savefig(stream, format=kind)})
 
 
 @app.command()

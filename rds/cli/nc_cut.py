@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, writes_files
+from rds.cli.common import Json, picture_kind, print_json, progress_bars, refusals, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, Program, With, setup
 
 if TYPE_CHECKING:
@@ -70,6 +70,7 @@ def cut(
         if library.suffix.lower() != ".toml":
             raise InputError("is no tool library; a cut needs the shapes of the tools, in a .toml file", str(library))
         path = out or file.parent / f"{file.stem}-cut.png"
+        kind = picture_kind(path)
         of, what = load_machine(machine), setup(library, parameters, with_, max_jumps)
         tools = {tool.number: tool for tool in read_library(library)}
         with progress_bars() as bar:
@@ -86,7 +87,6 @@ def cut(
             wanted = block.part(part)
             difference = Difference.of(block, wanted, tolerance)
         shown = picture(block, f"{file.name}{' as measured' if measured else ''}", wanted)
-        kind = _kind(path)
         writers: dict[Path, Callable[[BinaryIO], Any]] = {path: lambda stream: shown.savefig(stream, format=kind)}
         if save is not None:
             writers[save] = block.save
@@ -107,15 +107,6 @@ def cut(
     else:
         _tell(found, carving, tolerance)
     raise typer.Exit(1 if carving.faults or missed else 0)
-
-
-def _kind(path: Path) -> str:
-    from rds.core.errors import InputError
-
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg", "pdf"):
-        raise InputError("what kind of picture is that? end its name with .png, .svg or .pdf", str(path))
-    return kind
 
 
 def _stock(text: str | None, cell: float, blocks: list[PathBlock], tools: Any) -> Stock:

@@ -10,12 +10,14 @@ import typer
 
 from rds.cli.common import Json, print_json, refusals, writes_files
 
+_DECIMALS = 4
+
 
 @writes_files
 def job(
     file: Annotated[Path, typer.Argument(help="A job (.toml), or a drawing (.svg, .dxf) whose layers are listed.")],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="The part program to write.")] = None,
-    decimals: Annotated[int, typer.Option(min=1, max=9, help="Decimals of coordinates, in mm.")] = 4,
+    decimals: Annotated[int, typer.Option(min=1, max=9, help="Decimals of coordinates, in mm.")] = _DECIMALS,
     unit: Annotated[str | None, typer.Option(help="Of a DXF drawing that does not say its own: mm, cm, m, in.")] = None,
     json: Json = False,
 ) -> None:
@@ -26,7 +28,15 @@ def job(
     with refusals():
         from rds.core.errors import InputError
 
-        if file.suffix.lower() != ".toml":
+        is_job = file.suffix.lower() == ".toml"
+        if is_job and unit is not None:
+            raise InputError(
+                "--unit is for a drawing whose layers are listed; a job has `unit` among its own words", str(file)
+            )
+        if not is_job and (out is not None or decimals != _DECIMALS):
+            option = "--decimals" if out is None else "--out"
+            raise InputError(f"{option} is for a job (.toml); of a drawing the layers are listed, for a job to name")
+        if not is_job:
             found = _layers(file, unit)
         elif out is None:
             raise InputError("what is the part program to be called? give --out NAME.ngc", str(file))

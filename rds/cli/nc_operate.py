@@ -11,6 +11,7 @@ import typer
 from rds.cli.common import (
     Json,
     declared,
+    named_values,
     print_json,
     refusals,
 )
@@ -140,7 +141,7 @@ def operate(
         if hold + resume + home + stop > 1:
             raise InputError("--hold, --resume, --home and --stop exclude each other; give one of them")
         with live_values_of(folder) as live_values:
-            wanted = dict(map(_pair, set_ or ()))
+            wanted = named_values(set_ or (), "--set", "X.Pgain=30")
             wanted |= {} if override is None else {"override": override / 100.0}
             if resume:
                 wanted |= {"hold": 0.0, "resume": live_values["resume"] + 1.0}
@@ -155,13 +156,3 @@ def operate(
     else:
         for name, value in values.items():
             typer.echo(f"{name} = {value:g} {units[name]}".rstrip())
-
-
-def _pair(text: str) -> tuple[str, float]:
-    from rds.core.errors import InputError
-
-    name, _, value = text.partition("=")
-    try:
-        return name, float(value)
-    except ValueError:
-        raise InputError(f"--set {text!r} must be NAME=VALUE with a number, as in --set X.Pgain=30") from None

@@ -238,7 +238,7 @@ def _interpolator(
     name: str | None, arcs: str | None, options: list[str] | None, look_ahead: int | None
 ) -> dict[str, Any] | None:
     """The words of an interpolator; InputError for those that go with one which is not given."""
-    from rds.cli.interpolate import option_of
+    from rds.cli.interpolate import options_of
     from rds.core.errors import InputError
 
     if name is None:
@@ -246,7 +246,7 @@ def _interpolator(
             if given is not None and given != []:
                 raise InputError(f"{key} goes with --interpolator, which is not given; add --interpolator tustin")
         return None
-    words: dict[str, Any] = {"interpolator": name, "params": dict(map(option_of, options or ()))}
+    words: dict[str, Any] = {"interpolator": name, "params": options_of(options or ())}
     words |= {} if arcs is None else {"arc_interpolator": arcs}
     return words if look_ahead is None else words | {"look_ahead": look_ahead}
 

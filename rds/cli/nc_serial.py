@@ -5,12 +5,13 @@ Methods A, B and C bring one motion to them; by `moves` each module goes from po
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rds.cli.common import print_json, progress_bars
+from rds.cli.common import named_values, print_json, progress_bars
 
 if TYPE_CHECKING:
     from rds.nc.setup import Setup
@@ -38,7 +39,6 @@ def run_methods(
 
     InputError for words that are none; MachineError if a node or the bus fails.
     """
-    from rds.bus.tools.link import pair
     from rds.core.errors import InputError
     from rds.machines import load_machine
     from rds.modes import DEFAULT
@@ -51,7 +51,7 @@ def run_methods(
     if out is not None:
         require_writable(out)
     where, how = machine or _MACHINE, mode or DEFAULT
-    words: dict[str, Any] = dict(map(pair, options))
+    words = _words(options)
     loaded = load_machine(where)
     nodes = nodes_of(loaded, baud, words)
     names = all_of(nodes, how) if methods == "all" else methods.split(",")
@@ -136,7 +136,7 @@ def _run_moves(
     setup: Setup,
 ) -> None:
     """By the controllers of distributed modules: a move command to each axis of each line."""
-    from rds.bus.tools.link import BUILTIN, pair
+    from rds.bus.tools.link import BUILTIN
     from rds.core.errors import InputError
     from rds.machines import load_machine
     from rds.modes import DEFAULT
@@ -149,7 +149,7 @@ def _run_moves(
         raise InputError(f"{said}; with --method {METHOD} each module has a controller of its own")
     if out is not None:
         require_writable(out)
-    words: dict[str, Any] = dict(map(pair, option or []))
+    words = _words(option or ())
     bus = {"interface": words.pop("interface", BUILTIN), "bitrate": words.pop("bitrate", BITRATE)}
     where, how = machine or MACHINE, mode or DEFAULT
     with progress_bars() as bar:
@@ -166,6 +166,13 @@ def _run_moves(
     report = moves_report(run, file, {"machine": where, "mode": how, **words})
     files = write(report, out) if out is not None else []
     show_report(report, files, json)
+
+
+def _words(options: Iterable[str]) -> dict[str, Any]:
+    """The values of --option by name: numbers, true, false or texts."""
+    from can.util import cast_from_string
+
+    return named_values(options, "--option", "noise=0.001", cast_from_string)
 
 
 def show_report(report: Report, files: list[Path], json: bool) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
+from rds.cli.common import Json, named_values, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.logs import read_logs
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def validate(
         from rds.identification.validate.validate import validate as validate_model
         from rds.identification.validate.verdict import Bands
 
-        bands = Bands.read(_bands(band or []))
+        bands = Bands.read(named_values(band or (), "--band", "fit_percent=80"))
         with progress_bars() as bar:
             found = read_logs(logs, map_, axis, bar)
         made = validate_model(
@@ -110,24 +110,6 @@ def _show_crossed(crossed: list[CrossTestResult]) -> None:
     heads = ["log", "force error %", "of a fit to this log %", "published fit to this log %"]
     note = "Inverse dynamics with the model's parameters, none of them estimated here: 100 |force - model| / |force|."
     show_table("Cross-test", heads, rows, note)
-
-
-def _bands(given: list[str]) -> dict[str, float]:
-    from rds.core.errors import InputError
-
-    bands: dict[str, float] = {}
-    for text in given:
-        name, equals, value = text.partition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            equals = ""
-        if not name or not equals:
-            raise InputError(f"--band {text!r} must be NAME=VALUE with a number, as in --band fit_percent=80")
-        if name in bands:
-            raise InputError(f"--band {name} is given twice; give it once")
-        bands[name] = number
-    return bands
 
 
 def _show(made: Validation) -> None:

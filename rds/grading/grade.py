@@ -34,6 +34,11 @@ class Band(StrEnum):
     REVIEW = "review"  # it could not be measured: somebody has to look; never a zero
 
 
+def with_unit(value: float, unit: str, digits: int = 4) -> str:
+    """A criterion's value in words; the unit "1" is none."""
+    return f"{value:.{digits}g} {'' if unit == '1' else unit}".rstrip()
+
+
 @dataclass(frozen=True, slots=True)
 class CriterionScore:
     """One criterion's answer. `value` is None where nothing could be measured; `sentence` says what it means."""

@@ -91,6 +91,8 @@ def test_a_table_that_will_not_do_is_told_by_its_line(tmp_path: Path, text: str,
 def test_options_of_machines_are_refused_for_tables(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["bus", "analyse", str(tmp_path / "car.dbc"), "--fits"])
     assert done.exit_code == 2 and "--fits is for a machine" in done.stderr
+    done = CliRunner().invoke(app, ["bus", "analyse", str(tmp_path / "car.dbc"), "--period", "0.01", "--units", "5"])
+    assert done.exit_code == 2 and "--units is for a machine" in done.stderr
 
 
 def test_other_databases_are_converted_by_cantools() -> None:

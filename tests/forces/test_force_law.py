@@ -96,7 +96,10 @@ def test_a_table_is_fitted_written_and_used(tmp_path):
     lines += [f"{500 * d * f**0.8:.6f},{d},{f}" for d in (1.0, 2.0) for f in (0.1, 0.2, 0.4)]
     (tmp_path / "forces.csv").write_text("\n".join(lines))
     out = tmp_path / "mine.toml"
-    told = CliRunner().invoke(app, ["cutting", "fit", str(tmp_path / "forces.csv"), "-o", str(out), "--name", "mine"])
+    words = ["cutting", "fit", str(tmp_path / "forces.csv")]
+    told = CliRunner().invoke(app, [*words, "--fix", "speed=0", "--fix", "speed=1"])
+    assert told.exit_code == 2 and "--fix speed is given twice, 0 and 1" in told.stderr
+    told = CliRunner().invoke(app, [*words, "-o", str(out), "--name", "mine"])
     assert told.exit_code == 0 and "wrote" in told.stdout
     law = force_law("mine", out)
     assert (law.K, law.depth, law.feed) == (

@@ -143,6 +143,8 @@ def test_the_command(tmp_path):
     told = CliRunner().invoke(app, [*words, "--limit", "Y=150"])
     assert "exceeded: joint Y; a feed of" in told.stdout
     (tmp_path / "cut.toml").write_text("depth = 2.0\nteeth = 2\ndiameter = 6.0\nspeed = 500\n[limits]\nY = 900.0\n")
-    assert (
-        CliRunner().invoke(app, ["forces", "mini-cnc", str(path), "--cut", str(tmp_path / "cut.toml")]).exit_code == 0
-    )
+    words = ["forces", "mini-cnc", str(path), "--cut", str(tmp_path / "cut.toml")]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    for option, value in (("--limit", "Y=1"), ("--coefficients", "mine.toml")):
+        told = CliRunner().invoke(app, [*words, option, value])
+        assert told.exit_code == 2 and f"{option} belongs into the file of --cut" in told.stderr

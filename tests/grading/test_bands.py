@@ -11,7 +11,7 @@ from hypothesis.strategies import floats, text
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
 from rds.grading.assignment.assignment_file import LATE
-from rds.grading.assignment.late_rules import LateRules, days_late, read_late_rules
+from rds.grading.assignment.late_rules import LateRules, days_late, moved, read_late_rules
 from rds.grading.assignment.seeds import part_seed, student_seed
 from rds.grading.criteria.bands import Bands
 from rds.grading.grade import Band
@@ -61,6 +61,21 @@ def test_lateness_knows_time_zones() -> None:
     assert days_late(due, datetime(2026, 11, 30, 22, 59, tzinfo=UTC)) == 0.0
     assert days_late(due, datetime(2026, 12, 1, 10, 59, tzinfo=UTC)) == pytest.approx(0.5)
     assert days_late(None, due) == days_late(due, None) == 0.0
+
+
+@pytest.mark.parametrize("minutes", [9, 18, 47, 60, 90])
+def test_what_comes_in_to_the_second_costs_no_day(minutes: int) -> None:
+    due = datetime(2026, 11, 30, 23, 59, tzinfo=UTC)
+    late = LateRules(percent_per_day=10.0, grace_hours=minutes / 60)
+    end = due + timedelta(minutes=minutes)
+    assert late.lost(days_late(due, end)) == 0.0 and late.lost(days_late(due, end + timedelta(seconds=1))) == 0.1
+
+
+@pytest.mark.parametrize("extension", [0.1, 1.2, 3.4, 7.3])
+def test_an_extension_ends_to_the_second(extension: float) -> None:
+    due = datetime(2026, 11, 30, 23, 59, tzinfo=UTC)
+    days = moved(days_late(due, due + timedelta(days=1 + extension)), extension)
+    assert days == 1.0 and LateRules(percent_per_day=10.0).lost(days) == 0.1
 
 
 def test_a_late_table_is_read_strictly() -> None:

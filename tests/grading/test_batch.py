@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from rds.grading.assignment.hand_out import hand_out
 from rds.grading.batch import run as run_module
 from rds.grading.batch.journal import Journal, read_journal
 from rds.grading.batch.outcome import BatchOutcome
+from rds.grading.batch.record import Record, check_same
 from rds.grading.batch.run import run_batch
 from rds.grading.batch.warm_worker import _tried
 from rds.grading.grade import Grade, Status
@@ -215,6 +217,15 @@ def test_ctrl_c_ends_it_and_resume_goes_on(place: Path, outcome: BatchOutcome, t
     assert found.returncode == 0 and "graded already" in found.stderr
     told = json.loads(found.stdout)
     assert told["students"] == outcome.to_json()["students"]
+
+
+def test_what_could_not_be_read_before_may_have_a_time_now(tmp_path: Path) -> None:
+    """In Gradescope's folders, say, the time is that of the file that is chosen."""
+    before = Record("Small", "", "1", {}, {"ada": "grader error: cannot be opened"}, {}, "gradescope", None)
+    now = replace(before, handed_in={"ada": "2"}, times={"ada": "2026-01-09T10:00:00+00:00"})
+    check_same(before, now, tmp_path)
+    with pytest.raises(InputError, match=r"times of submission \(ada\)"):
+        check_same(replace(now, times={}), now, tmp_path)
 
 
 def test_what_has_changed_is_told_and_nothing_is_graded(place: Path, tmp_path: Path) -> None:

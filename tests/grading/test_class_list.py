@@ -47,6 +47,7 @@ def test_a_list_is_read_and_written_as_it_is(tmp_path: Path) -> None:
         ("student,group\nada,ben\nben,ben\n", "a group and a student"),
         ("student,name\nada\n", "number of cells"),
         ("student\n", "no student"),
+        ('student,name\nada,"Ada' + "\n" * 140_000, "class.csv: line .*quotation mark that is not closed"),
     ],
 )
 def test_a_list_that_will_not_do_is_refused(tmp_path: Path, text: str, said: str) -> None:
@@ -66,6 +67,18 @@ def test_students_are_found_by_identifier_address_and_name(tmp_path: Path) -> No
     assert name("Lovelace") == "" and name("ada") == "ada"
 
 
+def test_a_german_spreadsheet_s_list_has_commas_in_its_numbers(tmp_path: Path) -> None:
+    found = listed(tmp_path, "student;extension_days;late_days\nada;1,5;3\n")
+    assert (found.members[0].extension_days, found.members[0].late_days) == (1.5, 3)
+
+
+def test_the_number_of_a_participant_in_moodle_is_no_student_s() -> None:
+    known = ClassList((Member("501", "Grace Hopper"), Member("900", "Ada Lovelace")))
+    about = {"name": "Ada Lovelace", "id": "501"}
+    found = [known.find("Ada Lovelace_501", about | {"platform": each}) for each in ("moodle", "canvas")]
+    assert [member.student for member in found if member] == ["900", "501"]
+
+
 def row(student: str, hour: int | None = None, **more: object) -> HandedIn:
     time = None if hour is None else datetime(2026, 1, 10, hour, tzinfo=UTC)
     return HandedIn(student, f"{student}.py", time=time, **more)  # type: ignore[arg-type]
@@ -78,6 +91,14 @@ def test_the_last_file_of_a_group_counts_and_nobody_is_forgotten(tmp_path: Path)
     assert rows["red"].name == "ben.py" and "ben" in rows["red"].notes[0]
     assert rows["cy"].status is Status.MISSING
     assert set(rows["red"].source["handed_in_by"]) == {"ada", "ben"}
+
+
+def test_a_group_that_is_graded_again_keeps_what_the_export_says_of_each_member(tmp_path: Path) -> None:
+    ada = row("ada", 9, source={"id": "501"})
+    once = by_group(Intake("files", (ada, row("ben", 11))), listed(tmp_path))
+    assert by_group(once, listed(tmp_path)) == once
+    nothing = by_group(Intake("files", ()), listed(tmp_path))
+    assert by_group(nothing, listed(tmp_path)) == nothing
 
 
 def test_nobody_guesses_which_file_of_a_group_was_the_last(tmp_path: Path) -> None:

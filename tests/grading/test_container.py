@@ -8,10 +8,16 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from rds.cli.main import app
 from rds.core.errors import InputError
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.batch.finished import read_finished
 from rds.grading.container import container
+from rds.grading.review.publish import assignment_of
 from rds.grading.sandbox.requirements import _remedy
+from tests.grading.grades import batch_in, grade
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
 
 WITHOUT_UNIX = """
@@ -43,6 +49,12 @@ def test_ones_own_file_is_tried_where_there_is_no_unix(tmp_path: Path) -> None:
     assert done.returncode == 2 and "--trust-my-file" in done.stderr and "Traceback" not in done.stderr
     done = without_unix("platform", "run", str(task), str(task), "-o", str(tmp_path / "out"))
     assert done.returncode == 2 and "--container" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_what_a_container_has_graded_is_exported_where_there_is_no_unix(tmp_path: Path) -> None:
+    out = batch_in(tmp_path / "out", [grade("ada")])
+    done = without_unix("", "export", str(out), "--to", "moodle")
+    assert done.returncode == 0 and "1 students" in done.stdout, done.stderr
 
 
 def test_the_container_reads_what_it_grades_and_writes_one_folder(tmp_path: Path) -> None:
@@ -108,6 +120,37 @@ def test_the_image_is_made_of_this_copy_and_what_grading_requires(tmp_path: Path
     names = {line.partition(">")[0].partition("[")[0] for line in (tmp_path / "requirements.txt").read_text().split()}
     assert {"numpy", "scipy", "control", "pyarrow", "pyseccomp", "nbformat"} <= names
     assert not {"jupyterlab", "pytest", "mini-cnc-rds"} & names
+
+
+def test_no_option_of_the_command_is_lost_on_the_way_into_the_container(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[list[str]] = []
+    monkeypatch.setattr(container, "run_in_container", lambda a, s, out, options, mounted: asked.append(options) or 0)
+    monkeypatch.setenv("RDS_SHARED", "")  # put back afterwards, as the umask is not
+    monkeypatch.setattr("rds.cli.common.keep_process_private", lambda: None)
+    words = ["grade", "run", str(tmp_path), str(tmp_path), "-o", str(tmp_path / "out"), "--container"]
+    assert CliRunner().invoke(app, [*words, "--shared", "--jobs", "2", "--resume"]).exit_code == 0
+    assert asked == [["--jobs", "2", "--resume", "--shared"]]
+    done = CliRunner().invoke(app, [*words, "--tls-ca", "ca.pem"])
+    assert done.exit_code == 2 and "leave out --tls-ca" in done.output
+
+
+def test_the_record_has_the_assignment_s_place_and_not_the_container_s(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task, out = assignment_in(tmp_path / "task", HEAD + SINE + RMS), tmp_path / "out"
+    record = {"folder": "/assignment/task", "assignment": read_assignment(task).sha256}
+
+    def grades(words: list[str]) -> subprocess.CompletedProcess[str]:
+        batch_in(out, [grade("ada")], **record)
+        return subprocess.CompletedProcess(words, 0)
+
+    monkeypatch.setattr(container, "program", lambda: "docker")
+    monkeypatch.setattr(container, "build", lambda name: "rds-grader:1")
+    monkeypatch.setattr(container.subprocess, "run", grades)
+    assert container.run_in_container(task, task, out, []) == 0
+    assert assignment_of(read_finished(out)).folder == task
 
 
 def test_without_a_program_for_containers_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

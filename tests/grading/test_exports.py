@@ -276,6 +276,14 @@ def test_moodle_gradebook_is_filled_in_by_title(tmp_path: Path) -> None:
     assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["-", "26"]
 
 
+def test_the_number_of_a_participant_in_moodle_is_nobody_s_id_number(tmp_path: Path) -> None:
+    book = tmp_path / "grades.csv"
+    book.write_text("Full name,ID number,Assignment: Tracking (Real)\nAda Lovelace,900,-\nGrace Hopper,501,-\n")
+    ada = from_platform("moodle", "Ada Lovelace_501", id="501", name="Ada Lovelace")
+    done = exported(tmp_path, "moodle", [ada], ExportOptions(gradebook=book))
+    assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["26", "-"]
+
+
 def test_moodle_without_a_download_has_three_columns(tmp_path: Path) -> None:
     done = exported(tmp_path, "moodle", [grade("ada@x.edu"), grade("4711")])
     assert Path(done.files[0]).read_text().splitlines() == [
@@ -348,6 +356,15 @@ def test_one_student_may_be_one_file(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "results.json").read_text())["score"] == 26.0
 
 
+def test_the_folder_for_the_files_of_the_students_may_have_a_dot_in_its_name(tmp_path: Path) -> None:
+    out, place = batch_in(tmp_path / "out", [grade("ada"), grade("bob")]), tmp_path / "grades.2026"
+    with pytest.raises(InputError, match="have to be a folder"):
+        export(out, "gradescope", place, NOTHING)
+    place.mkdir()
+    assert len(export(out, "gradescope", place, NOTHING).files) == 2
+    assert (place / "bob/results.json").is_file()
+
+
 @pytest.mark.parametrize("to", GRADEBOOKS.names())
 def test_options_are_used_or_refused(to: str, tmp_path: Path) -> None:
     out = batch_in(tmp_path / "out", [grade("ada")])
@@ -376,6 +393,9 @@ def test_refusals(tmp_path: Path) -> None:
         export(out, "canvas", None, ExportOptions(gradebook=book))
     with pytest.raises(InputError, match=r"rds grade run"):
         export(tmp_path, "nbgrader", None, NOTHING)
+    for points in (0.0, float("nan"), float("inf")):
+        with pytest.raises(InputError, match="must be a finite number above 0"):
+            export(out, "nbgrader", None, ExportOptions(points=points))
     (out / "students/ada/grade.json").write_text("{}")
     with pytest.raises(InputError, match="is not a grade"):
         export(out, "nbgrader", None, NOTHING)

@@ -133,6 +133,10 @@ def test_brightspace_gets_the_columns_of_its_sample(tmp_path: Path) -> None:
     (tmp_path / "down.csv").write_text(text.replace("MaxPoints:30", "MaxPoints:20"))
     with pytest.raises(InputError, match="give --points 20"):
         exported(tmp_path / "3", "brightspace", [grade("ada")], wanted=ExportOptions(tmp_path / "down.csv"))
+    twice = f"{item},{item.replace('Weight', 'Category:B Weight')}"  # of two categories
+    (tmp_path / "down.csv").write_text(f"Username,{twice},End-of-Line Indicator\n#ada,,,#\n")
+    with pytest.raises(InputError, match="several items 'Tracking'"):
+        exported(tmp_path / "4", "brightspace", [grade("ada")], wanted=ExportOptions(tmp_path / "down.csv"))
 
 
 def test_feedback_goes_back_to_moodle_by_the_participants_number(tmp_path: Path) -> None:

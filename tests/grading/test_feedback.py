@@ -224,6 +224,11 @@ def test_the_class_page_names_what_needs_a_look_first() -> None:
     assert re.search(r"<td>total</td><td class=\"number\">13</td>", page)
 
 
+def test_a_value_without_a_unit_has_none_on_the_class_page() -> None:
+    page = "".join(class_page("T", [grade("ada", Status.OK, score("damping", value=0.7, unit="1"))], {}))
+    assert ">0.7</td>" in page
+
+
 @given(st.text())
 def test_text_of_others_can_do_nothing(text: str) -> None:
     assert all(each.isprintable() or each in "\n\t" for each in plain(text))

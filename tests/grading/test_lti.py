@@ -23,6 +23,7 @@ from rds.core.errors import InputError
 from rds.grading.exports.export import export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.intake import collect
+from rds.grading.lti.launches import Launched, keep_submission
 from rds.grading.lti.registration import read_registration
 from rds.grading.lti.tool import _multipart
 from tests.grading.grades import batch_in, grade
@@ -240,6 +241,13 @@ def test_nothing_is_kept_without_a_pass_or_under_another_name(course: Course) ->
     assert course.hand_in(word, "../../law.py", b"y = 2")[0] == 200
     (path,) = course.folder.glob("**/*.py")
     assert path.parent.parent == course.folder / "in"
+
+
+def test_times_that_a_spreadsheet_has_saved_are_kept_on(tmp_path: Path) -> None:
+    (tmp_path / "timestamps.csv").write_text("student;timestamp\nben;2026-01-10T13:00:00+00:00\n")
+    keep_submission(tmp_path, Launched("ada", "7"), "law.py", b"x = 1")
+    students = [line.partition(",")[0] for line in (tmp_path / "timestamps.csv").read_text().splitlines()]
+    assert students == ["student", "ada", "ben"]
 
 
 def test_a_registration_without_https_is_refused(tmp_path: Path) -> None:

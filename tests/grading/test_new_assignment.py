@@ -37,6 +37,8 @@ def test_secrets_differ_and_nothing_is_written_over(tmp_path: Path) -> None:
         new_assignment(tmp_path / name, "functions", title='An "odd" title')
     one, other = (read_assignment(tmp_path / name) for name in ("a", "b"))
     assert one.secret != other.secret and one.title == 'An "odd" title'
+    new_assignment(tmp_path / "c", "functions", title="THE TITLE of SECRET")  # the words that stand for both
+    assert read_assignment(tmp_path / "c").title == "THE TITLE of SECRET"
     with pytest.raises(InputError, match="there already"):
         new_assignment(tmp_path / "a", "functions")
     with pytest.raises(InputError, match="must be one of"):

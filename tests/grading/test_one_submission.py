@@ -118,11 +118,13 @@ def test_without_a_sandbox_nothing_is_run_and_nobody_gets_a_zero(
     assert "bubblewrap is missing" in data["output"] + str(data.get("format_errors"))
 
 
-@pytest.mark.parametrize("damage", ["about", "assignment", "submission"])
-def test_an_answer_is_there_whatever_is_missing(damage: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("damage", "left"), [("about", "{"), ("about", '{"users": {"7": "ada"}}'), ("assignment", ""), ("submission", "")]
+)
+def test_an_answer_is_there_whatever_is_missing(damage: str, left: str, tmp_path: Path) -> None:
     root = container_in(tmp_path, "gradescope")
     path = root / getattr(CONTAINERS["gradescope"], damage)
-    shutil.rmtree(path) if path.is_dir() else path.write_text("{")
+    shutil.rmtree(path) if path.is_dir() else path.write_text(left)
     (root / "results/results.json").write_text('{"score": 100}')  # as an earlier one might have left it
     data = json.loads(grade_in("gradescope", root).read_text())
     assert "score" not in data and "nothing was graded" in data["output"]

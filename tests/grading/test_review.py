@@ -15,14 +15,16 @@ from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
 from rds.grading.assignment.late_rules import LateRules
 from rds.grading.batch.finished import read_finished
-from rds.grading.course.class_list import ClassList, Member
+from rds.grading.course.class_list import ClassList, Member, read_class_list
+from rds.grading.exports.export import export
+from rds.grading.exports.exported import ExportOptions
 from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Band, Grade, Status
 from rds.grading.review.applied import of_review, reviewed
 from rds.grading.review.best import best
 from rds.grading.review.entries import FILE, Entry, Kind, Review, add, read_review
 from rds.grading.review.everyone import everyone
-from rds.grading.review.regrade import changes_of
+from rds.grading.review.regrade import _kept, changes_of
 from rds.grading.review.say import marks_table, read_marks, say
 from tests.grading.grades import batch_in, grade, score
 from tests.grading.made import RMS, SINE, assignment_in
@@ -83,6 +85,12 @@ def test_an_excused_student_has_no_score_and_is_in_no_gradebook(tmp_path: Path) 
     finished = read_finished(tmp_path / "out")
     assert [each.student for each in finished.to_hand_on] == ["ben"]
     assert [each.student for each in finished.excused] == ["ada"]
+    for to in ("gradescope", "prairielearn"):
+        export(tmp_path / "out", to, None, ExportOptions())
+        text = (tmp_path / "out" / to / "ada/results.json").read_text()
+        assert "excused" in text and "points" not in text and "score" not in json.loads(text)
+    page = (tmp_path / "out/students/ada/feedback.html").read_text()
+    assert "You are excused" in page and " of 30 points</p>" not in page
 
 
 def test_the_trail_only_grows_and_notices_what_was_taken_out(tmp_path: Path) -> None:
@@ -175,6 +183,30 @@ def test_the_best_attempt_counts_with_what_was_said_of_it(tmp_path: Path) -> Non
     assert "2: 30 (counts)" in finished.grades[0].notes[-1]
 
 
+def test_late_days_are_never_given_back_by_the_best_of_attempts(tmp_path: Path) -> None:
+    run, after = CliRunner().invoke, tmp_path / "next.csv"
+    first = made(tmp_path / "1", words="student,late_days\nada,3\nben,0\n")
+    second = made(tmp_path / "2", words="student,late_days\nada,3\nben,0\n")
+    (second / "batch.json").write_text((first / "batch.json").read_text())
+    best([first, second], tmp_path / "best")
+    done = run(app, ["grade", "late-days", str(tmp_path / "best"), "-o", str(after)])
+    assert done.exit_code == 2 and "in the batch of each" in done.output and not after.exists()
+    assert run(app, ["grade", "late-days", str(first), "-o", str(after)]).exit_code == 0
+    assert [member.late_days for member in read_class_list(after).members] == [3, 0]
+
+
+def test_a_grader_error_in_one_attempt_is_no_zero_beside_another(tmp_path: Path) -> None:
+    def batch(number: int, **statuses: Status) -> Path:
+        return made(tmp_path / str(number), *(grade(name, status) for name, status in statuses.items()))
+
+    first = batch(1, ada=Status.MISSING, ben=Status.OK)
+    second = batch(2, ada=Status.GRADER_ERROR, ben=Status.GRADER_ERROR)
+    (second / "batch.json").write_text((first / "batch.json").read_text())
+    ada, ben = best([first, second], tmp_path / "best").grades
+    assert (ada.status, ben.status) == (Status.GRADER_ERROR, Status.OK)
+    assert ben.notes[-1] == "Points of 2 attempts: 1: 26 (counts), 2: grader error."
+
+
 def test_who_changes_is_told_with_the_reason(tmp_path: Path) -> None:
     before = read_finished(made(tmp_path / "1", grade("ada", Status.OK, score(), score("old", 1.0))))
     new = (replace(score(points=8.0), value=0.23), score("new", 2.0))
@@ -183,6 +215,17 @@ def test_who_changes_is_told_with_the_reason(tmp_path: Path) -> None:
     assert (change.before, change.now) == (7.0, 10.0)
     assert change.why[0] == "rms: 6 → 8 points, because its bands are others (the same value, 0.23 mm)"
     assert "a new criterion" in change.why[1] or "no longer" in change.why[1]
+    unknown = replace(score(points=2.0), value=None, band=Band.REVIEW)
+    before = read_finished(made(tmp_path / "3", grade("ada", Status.OK, unknown)))
+    (change,) = changes_of(before, read_finished(made(tmp_path / "4", grade("ada"))))
+    assert change.why[0].endswith("because its value was not measured and is 0.23 mm")
+
+
+def test_what_was_no_student_s_fault_is_none_when_it_is_graded_again(tmp_path: Path) -> None:
+    statuses = {"ada": Status.OK, "ben": Status.GRADER_ERROR, "cy": Status.MISSING, "dan": Status.REFUSED}
+    before = read_finished(made(tmp_path, *(grade(name, status) for name, status in statuses.items())))
+    found = {row.student: row.status for row in _kept(before).rows}
+    assert found == statuses | {"ada": Status.GRADER_ERROR}  # whose file is gone
 
 
 def test_everyone_is_found_by_what_the_export_says() -> None:
@@ -195,6 +238,18 @@ def test_everyone_is_found_by_what_the_export_says() -> None:
     assert counting.details["section"] == "A" and counting.score > measured.score
 
 
+def test_a_user_without_a_name_gives_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nobody() -> str:
+        raise KeyError("getpwuid(): uid not found: 1000")
+
+    monkeypatch.setattr("getpass.getuser", nobody)
+    out = str(made(tmp_path))
+    run = CliRunner().invoke
+    assert run(app, ["grade", "review", out]).exit_code == 0
+    said = run(app, ["grade", "review", out, "--student", "ada", "--comment", "x"])
+    assert said.exit_code == 2 and "give --by NAME" in said.output
+
+
 def test_the_command_says_what_waits_and_refuses_half_a_sentence(tmp_path: Path) -> None:
     unknown = replace(score(), band=Band.REVIEW, value=None)
     out = made(tmp_path, grade("ada", Status.OK, unknown))
@@ -202,6 +257,14 @@ def test_the_command_says_what_waits_and_refuses_half_a_sentence(tmp_path: Path)
     assert "could not be" in run(app, ["grade", "review", str(out)]).output
     assert run(app, ["grade", "review", str(out), "--points", "3"]).exit_code == 2
     assert run(app, ["grade", "review", str(out), "--student", "ada"]).exit_code == 2
+    for words, said in (
+        (["--student", "ada", "--criterion", "rms", "--excuse"], "--criterion has no meaning with --excuse"),
+        (["--student", "ada", "--undo", "1"], "--student has no meaning with --undo"),
+        (["--marks", str(out / "grades.csv"), "--why", "late"], "--why has no meaning with --marks"),
+        (["--student", "ada", "--points", "1", "--undo", "1"], "one thing at a time"),
+    ):
+        done = run(app, ["grade", "review", str(out), *words])
+        assert done.exit_code == 2 and said in done.output
     words = ["--student", "ada", "--criterion", "rms", "--points", "3", "--by", "ann"]
     assert run(app, ["grade", "review", str(out), *words]).exit_code == 0
     assert "nothing waits" in run(app, ["grade", "review", str(out)]).output

@@ -112,6 +112,13 @@ def test_rows_of_an_interpolator_come_as_numbers(pool: Pool, written: Callable[.
         assert len(list(subject.rows(arc, T))) == 100
 
 
+def test_a_row_that_is_none_is_a_fault_and_no_end(pool: Pool, written: Callable[..., Path]) -> None:
+    path = written("def interpolate(segment, T, params):\n    yield [1.0], [0.0], [0.0]\n    yield\n")
+    segment = LineSegment((0.0,), (1.0,), 10.0)
+    with pool.open(path, kind="interpolator") as subject, pytest.raises(SubmissionError, match="row 1 is None"):
+        list(subject.rows(segment, 1e-3))
+
+
 def test_an_interpolator_without_an_end_is_cut(pool: Pool, written: Callable[..., Path]) -> None:
     text = "def interpolate(segment, T, params):\n    while True:\n        yield [0.0], [0.0], [0.0]\n"
     with (

@@ -14,8 +14,11 @@ import pytest
 from waiting import wait_for
 
 from rds.core.types import Reference
-from rds.grading.sandbox import Pool, available
+from rds.grading.sandbox import Limits, Pool, SandboxError, available
 from rds.grading.sandbox import requirements as requirements
+from rds.grading.sandbox.budget import Budget
+from rds.grading.sandbox.cell import Cell
+from rds.grading.sandbox.supervise import Supervisor
 
 Written = Callable[..., Path]
 
@@ -66,6 +69,20 @@ def test_a_closed_pool_holds_nothing_open(pool: Pool) -> None:
         kept = [*own._interpreters.values()]  # whoever still refers to it
     assert len(os.listdir("/proc/self/fd")) == before
     assert not any(each.is_alive for each in kept)
+
+
+def test_a_cell_that_could_not_be_started_holds_nothing_open() -> None:
+    class Gone:
+        resident_bytes = 0
+
+        def fork(self, _request: object, _fds: object) -> None:
+            raise SandboxError("the warm interpreter is gone")
+
+    supervisor, before = Supervisor(), len(os.listdir("/proc/self/fd"))
+    with pytest.raises(SandboxError, match="is gone"):
+        Cell(Gone(), Budget(Limits()), supervisor)  # type: ignore[arg-type]
+    supervisor.close()
+    assert len(os.listdir("/proc/self/fd")) == before
 
 
 @pytest.mark.usefixtures("pool")

@@ -6,12 +6,14 @@ import ast
 import json
 import re
 from itertools import combinations
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.grading.batch.alike import Behaviour
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.batch.alike import Behaviour, earlier_files
 from rds.grading.batch.similarity import (
     GRAM,
     LEAST_COMMON,
@@ -25,6 +27,8 @@ from rds.grading.batch.similarity import (
     similar_pairs,
 )
 from rds.grading.batch.similarity_table import alike_json, found_html
+from tests.grading.batches import ASSIGNMENT, law, put
+from tests.grading.made import assignment_in
 
 LAW = '''"""PD control with a filtered derivative."""
 
@@ -193,3 +197,13 @@ def test_equal_runs_make_a_group_whatever_the_programs_look_like() -> None:
     groups = same_loops(given, {"2024/eve": other})
     assert [(group.students, group.others) for group in groups] == [(("ada", "ben"), ()), (("cy",), ("2024/eve",))]
     assert "to the last bit" in found_html(json.loads(alike_json([], [], groups)))
+
+
+def test_files_of_two_years_in_folders_of_one_name_are_both_compared(tmp_path: Path) -> None:
+    read = read_assignment(assignment_in(tmp_path / "task", ASSIGNMENT, law()))
+    places = [put(tmp_path / year / "submitted", {"ada.py": year}) for year in ("2023", "2024")]
+    found = earlier_files(read, places)
+    assert {name: code.read() for name, code in found.items()} == {
+        f"{place}/ada": place.parent.name.encode() for place in places
+    }
+    assert list(earlier_files(read, places[:1])) == ["submitted/ada"]

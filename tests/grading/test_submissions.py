@@ -383,6 +383,13 @@ def test_gradescope_metadata_that_is_none(tmp_path: Path, text: str) -> None:
         collect(put(tmp_path, {"submission_metadata.yml": text, "submission_1/controller.py": ""}), ACCEPTED)
 
 
+def test_gradescope_metadata_that_is_not_opened_is_told_to_who_grades(tmp_path: Path) -> None:
+    put(tmp_path, {"submission_1/controller.py": ""})
+    (tmp_path / "submission_metadata.yml").symlink_to(tmp_path / "elsewhere.yml")
+    with pytest.raises(InputError, match=r"submission_metadata\.yml: cannot be read: it is a link"):
+        collect(tmp_path, ACCEPTED)
+
+
 def test_times_of_the_instructor(tmp_path: Path) -> None:
     times = "student,timestamp\nada,2026-01-10T13:00:00\nben,2026-01-10T13:00:00Z\nJos\u00e9,2026-01-10T12:00:00\n"
     files = {"ada.py": "", "ben.py": "", "Jose\u0301.py": "", "timestamps.csv": times}  # as a Mac writes an accent
@@ -418,6 +425,13 @@ def test_which_file_of_several(tmp_path: Path) -> None:
     assert "controller.py is graded, and not controller.ipynb" in found["ada"].notes
     assert found["ben"].status is Status.REFUSED and "one.py, two.py" in found["ben"].reason
     assert found["cy"].read() == b"law (1).py"
+
+
+def test_the_number_of_an_accepted_name_is_its_own(tmp_path: Path) -> None:
+    """The next task's file in the same folder is no newer attempt of this one."""
+    files = {"ada/task-1.py": "this", "ada/task-2.py": "next", "ben/task-1-1.py": "again", "ben/task-1.py": "before"}
+    found = rows(collect(put(tmp_path, files), ("task-1.py",)))
+    assert [found[name].read() for name in ("ada", "ben")] == [b"this", b"again"]
 
 
 def test_copies_and_older_versions_beside_a_file_do_no_harm(tmp_path: Path) -> None:

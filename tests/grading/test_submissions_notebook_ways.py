@@ -69,6 +69,12 @@ from tests.grading.test_submissions_notebooks import made
         'from scipy.optimize import minimize\ndef cost(x):\n    params["Kp"] = 30.0\n    return float(x[0]) ** 2\nresult = minimize(cost, [1.0])',
         'old = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, {"Kp": 30.0})',
         'from collections import ChainMap\nc = ChainMap(params)\nc["Kp"] = 30.0',
+        'steps = []\ndef put():\n    params["Kp"] = 30.0\nsteps.append(put)\nfor step in steps:\n    step()',
+        'steps = {}\nsteps["put"] = lambda: params.update(Kp=30.0)\nfor step in steps.values():\n    step()',
+        "steps = []\nsteps += [lambda: params.update(Kp=30.0)]\n[step() for step in steps]",
+        'box = []\nbox += [params]\nbox[0]["Kp"] = 30.0',
+        'class Tuner:\n    def __init__(self, p):\n        self.p = p\n    def set(self, k):\n        self.p["Kp"] = k\nt = Tuner(params)\nt.set(2.0)\nTuner(params).set(30.0)',
+        'class Tuner:\n    def __init__(self, p):\n        self.p = p\nt = Tuner(params)\nt.p["Kp"] = 2.0\nTuner(p=params).p["Kp"] = 30.0',
     ],
 )
 def test_a_gain_that_is_set_in_an_unusual_way_is_graded(cell: str) -> None:

@@ -55,6 +55,14 @@ def test_lines_keep_their_numbers() -> None:
     assert text.split("\n")[6] == "def control():"
 
 
+def test_what_shares_a_line_with_what_is_graded_is_left_out_too() -> None:
+    cell = "params = {'ü': 1.0}; plt.plot([1]); params['K'] = 2.0; plt.plot(\n    [1]); params['T'] = 3.0; plt.show()"
+    text = converted(notebook("import matplotlib.pyplot as plt", cell, law()).encode(), ("params",)).code.decode()
+    names: dict[str, object] = {}
+    exec(text.partition("# cell 3")[0], names)
+    assert names["params"] == {"ü": 1.0, "K": 2.0, "T": 3.0} and "plt" not in text
+
+
 def test_a_fault_of_syntax_is_told_with_its_cell() -> None:
     cells = ("print(1)\nprint(2)", "x = 1\ndef control(t, r, y, state, params)\n    return x")
     found = converted(notebook(*cells).encode())

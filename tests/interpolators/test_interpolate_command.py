@@ -216,6 +216,7 @@ def test_faults_of_a_user_s_file_are_those_of_the_check(tmp_path: Path) -> None:
         ("--line 0,0:1,1 --feed 1 -m euler --option blue=1", "did you mean 'blu'"),
         ("--line 0,0:1,1 --feed 1 -m euler --option blu=high", "must be a number"),
         ("--line 0,0:1,1 --feed 1 -m euler --option blu", "must be NAME=VALUE"),
+        ("--line 0,0:1,1 --feed 1 -m euler --option blu=1 --option blu=2", "--option blu is given twice, 1 and 2"),
         ("--line 0,0:1,1 --feed 1 --multipliers 1,2", "goes with --acceleration"),
         ("--line 0,0:1,1 --feed 1 --exact-stop", "--exact-stop goes with --acceleration"),
         ("--line 0,0:1,1 --feed 1 --acceleration s-shape --multipliers 1,x", "write them as numbers"),

@@ -279,6 +279,9 @@ def test_the_commands_list_layers_make_and_cut(folder: Path) -> None:
     run = CliRunner()
     found = json.loads(run.invoke(app, ["nc", "make", "job", str(folder / "plate.svg"), "--json"]).stdout)
     assert [layer["layer"] for layer in found["layers"]] == ["outline", "pocket", "holes"]
+    for words in (["plate.svg", "--out", "part.ngc"], ["plate.svg", "--decimals", "3"], ["job.toml", "--unit", "mm"]):
+        refused = run.invoke(app, ["nc", "make", "job", str(folder / words[0]), *words[1:]])
+        assert refused.exit_code == 2 and f"{words[1]} is for" in refused.stderr
     program = folder / "part.ngc"
     made = run.invoke(app, ["nc", "make", "job", str(folder / "job.toml"), "-o", str(program), "--json"])
     assert len(json.loads(made.stdout)["operations"]) == 3

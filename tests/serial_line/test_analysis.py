@@ -42,6 +42,9 @@ def test_the_command_says_what_fits(tmp_path: Path) -> None:
     told = runner.invoke(app, ["bus", "analyse", "starmill", "--dialect", "dcs", "--plot", str(picture)])
     assert told.exit_code == 0 and "leaves 5.35 ms" in told.output
     assert picture.read_bytes().startswith(b"\x89PNG")
+    words = ["bus", "analyse", "starmill", "--dialect", "dcs", "--plot", str(tmp_path / "load.xyz")]
+    odd = runner.invoke(app, words)
+    assert odd.exit_code == 2 and "what kind of picture is that" in odd.output
     slow = runner.invoke(app, ["bus", "analyse", "starmill", "--dialect", "dcs", "--baud", "38400", "--json"])
     assert slow.exit_code == 1 and json.loads(slow.stdout)["fits"] is False
     can = runner.invoke(app, ["bus", "analyse", "mini-cnc", "--fits", "--json"])

@@ -10,6 +10,7 @@ from math import ceil, inf
 from rds.core.toml_table import TomlTable
 
 _DAY = 86_400.0  # s
+_DIGITS = 9  # of days, a tenth of a millisecond: with less, rounding would cost a day that ends to the second
 
 
 @dataclass(frozen=True)
@@ -28,19 +29,22 @@ class LateRules:
 
     def spent(self, days: float, left: int | None = None) -> int:
         """Late days that are spent after `days` days, of those that the student has `left` (None: nobody counts)."""
-        if days * 24.0 <= self.grace_hours or days > self.zero_after_days:
+        if self._is_in_time(days) or days > self.zero_after_days:
             return 0
         free = self.free_days if left is None else min(self.free_days, left)
         return min(free, ceil(days))
 
     def lost(self, days: float, left: int | None = None) -> float:
         """The share of the points that is lost after `days` days, 0 to 1; `left` as in `spent`."""
-        if days * 24.0 <= self.grace_hours:
+        if self._is_in_time(days):
             return 0.0
         if days > self.zero_after_days:
             return 1.0
         charged = ceil(days) - self.spent(days, left)
         return min(self.percent_per_day * charged, self.cap_percent) / 100.0
+
+    def _is_in_time(self, days: float) -> bool:
+        return days <= round(self.grace_hours / 24.0, _DIGITS)
 
     def to_table(self) -> Mapping[str, float]:
         """As the words of an assignment."""
@@ -51,7 +55,12 @@ def days_late(due: datetime | None, submitted: datetime | None) -> float:
     """Days from `due` to `submitted`, both with their time zone; 0 where either is unknown, or in time."""
     if due is None or submitted is None:
         return 0.0
-    return max(0.0, (submitted - due).total_seconds() / _DAY)
+    return moved((submitted - due).total_seconds() / _DAY, 0.0)
+
+
+def moved(days: float, extension: float) -> float:
+    """Days late where the due time is `extension` days later; 0 in time."""
+    return max(0.0, round(days - extension, _DIGITS))
 
 
 def read_late_rules(words: TomlTable | None) -> LateRules:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 from pathlib import Path
 
@@ -25,7 +26,8 @@ def new_assignment(folder: Path, kind: str, title: str = "") -> list[Path]:
     said = title or folder.resolve().name.replace("-", " ").replace("_", " ").capitalize()
     if "\n" in said or not said.isprintable():
         raise InputError(f"title = {said!r} must be one line of text")
-    quoted = toml_text({"title": said}).partition("=")[2].strip()
+    words = {'"TITLE"': toml_text({"title": said}).partition("=")[2].strip(), "TITLE": said}
+    words["SECRET"] = secrets.token_hex(16)
     made = []
     try:
         make_folder(folder)
@@ -33,7 +35,7 @@ def new_assignment(folder: Path, kind: str, title: str = "") -> list[Path]:
             if not source.is_file():
                 continue
             text = source.read_text(encoding="utf-8")
-            text = text.replace('"TITLE"', quoted).replace("TITLE", said).replace("SECRET", secrets.token_hex(16))
+            text = re.sub('"TITLE"|TITLE|SECRET', lambda found: words[found[0]], text)
             write_private(folder / source.name, text.encode())
             made.append(folder / source.name)
     except OSError as error:

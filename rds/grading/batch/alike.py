@@ -66,10 +66,15 @@ class Behaviour:
 
 
 def earlier_files(assignment: Assignment, places: Sequence[Path]) -> dict[str, Spooled]:
-    """Python by name, of all `places`: batches' folders, and folders or zips of submissions, or single files."""
+    """Python by name, of all `places`: batches' folders, and folders or zips of submissions, or single files.
+
+    A name begins with that of its place; with the whole path where several places are called alike.
+    """
     found: dict[str, Spooled] = {}
     spool = Spool()
-    for place in places:
+    called = [place.resolve().name for place in places]
+    for place, name in zip(places, called, strict=True):
+        whose = name if called.count(name) == 1 else str(place)
         if (place / _RECORD).is_file():
             codes = sorted((place / _STUDENTS).glob(f"*/{CODE}"))
             files = {path.parent.name: spool.put(path.read_bytes()) for path in codes}
@@ -81,8 +86,7 @@ def earlier_files(assignment: Assignment, places: Sequence[Path]) -> dict[str, S
             raise InputError(
                 "holds no submission to compare with; name a batch, or a folder of submissions", str(place)
             )
-        for name, code in files.items():
-            found[f"{place.resolve().name}/{name}"] = code
+        found |= {f"{whose}/{student}": code for student, code in files.items()}
     return found
 
 

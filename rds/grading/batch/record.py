@@ -84,7 +84,7 @@ def check_same(before: Record, now: Record, place: Path) -> None:
     kept = [student for student in before.handed_in if student in now.handed_in]
     readable = [s for s in kept if not before.handed_in[s].startswith(f"{Status.GRADER_ERROR}:")]
     changes += _named("submissions", [s for s in readable if before.handed_in[s] != now.handed_in[s]])
-    changes += _named("times of submission", [s for s in kept if before.times.get(s) != now.times.get(s)])
+    changes += _named("times of submission", [s for s in readable if before.times.get(s) != now.times.get(s)])
     if changes:
         raise InputError(
             f"cannot be resumed, because these have changed since it was begun: {'; '.join(changes)}. Put back what "

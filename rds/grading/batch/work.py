@@ -97,7 +97,7 @@ def graded(setup: Setup, task: Task) -> Answer:
     if own and own == behaviour(assignment, expected):
         about[AS_SOLUTION] = True
     grade = replace(grade, notes=(*task.notes, *grade.notes), details=about)
-    page = feedback_page(assignment, grade, found.runs, expected, same_plants=False)
+    page = feedback_page(assignment, grade, found.runs, expected)
     files = {FEEDBACK: page.encode("utf-8", "replace")}
     if found.runs:
         files[COLUMNS] = columns_of(found.runs)

@@ -90,9 +90,9 @@ class ControlCase:
         if self.noise:
             result = self._with_actual(result, actual)
         low, high, _ = voltage_limits(plan)
-        facts = {"limits": (low, high), "unit": self.unit, "noisy": bool(self.noise)}
+        facts = {"limits": (low, high), "noisy": bool(self.noise)}
         if self.disturbance is not None:
-            facts |= {"disturbed_from": self.disturbance.start, "disturbed_until": self.disturbance.end}
+            facts["disturbed_from"] = self.disturbance.start
         linear = self._linear_or_why(submitted, models, done, seed, number) if LINEAR in needs else None
         return CaseRun(self.name, number, result, done.fault, counts, linear, facts)
 

@@ -37,17 +37,13 @@ def asked(answers: Answers, coupled: bool) -> Controller:
     return Controller(lambda t, r, y, state, params: (control(t, r, y), state), source=SUBMISSION, coupled=coupled)
 
 
-def with_parts(
-    plan: Plan, controllers: Sequence[Controller | None], models: Sequence[Model], ideal: bool = False
-) -> Plan:
-    """The plan with these controllers (None: its own) and models; `ideal` without saturation and quantization."""
+def with_parts(plan: Plan, controllers: Sequence[Controller | None], models: Sequence[Model]) -> Plan:
+    """The plan with these controllers (None: its own) and models."""
     axes = tuple(
         replace(axis, controller=controller or axis.controller, model=model)
         for axis, controller, model in zip(plan.axes, controllers, models, strict=True)
     )
-    return replace(
-        plan, axes=axes, saturation=plan.saturation and not ideal, quantization=plan.quantization and not ideal
-    )
+    return replace(plan, axes=axes)
 
 
 def run_loop(plan: Plan, meta: dict[str, Any]) -> LoopRun:

@@ -64,7 +64,7 @@ class ModelCase:
         columns = dict(data.columns) | {f"{axis}_modelled": modelled}
         units = dict(data.units) | {f"{axis}_modelled": self.unit}
         counts = subject.counts if COUNTS in needs else None
-        return CaseRun(self.name, number, Result(columns, units, data.meta), counts=counts, facts={"unit": self.unit})
+        return CaseRun(self.name, number, Result(columns, units, data.meta), counts=counts)
 
     def _measured(self, seed: int, number: int) -> Result:
         plan = self.plan

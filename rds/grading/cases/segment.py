@@ -66,8 +66,7 @@ class SegmentCase:
                 columns[f"{axis}_reference{word}"] = whole[:, part, k]
                 units[f"{axis}_reference{word}"] = unit
         result = Result(columns, units, {"axes": list(self.axes), "sample_period": self.T, "mode": "interpolation"})
-        facts = {"segment": self.segment, "unit": "mm"}
-        return CaseRun(self.name, number, result, counts=counts, facts=facts, rows=rows)
+        return CaseRun(self.name, number, result, counts=counts, facts={"segment": self.segment}, rows=rows)
 
 
 def read(words: TomlTable, folder: Path, machine: str) -> SegmentCase:

@@ -12,6 +12,7 @@ for which a container needs CAP_SYS_ADMIN.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -20,11 +21,13 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.core.installed import DISTRIBUTION
 from rds.core.private_files import make_folder
 
 PROGRAMS = ("docker", "podman")
+RECORD = "batch.json"
 _PACKAGE = Path(__file__).resolve().parents[2]
 _OPENED = ("--security-opt", "seccomp=unconfined", "--security-opt", "apparmor=unconfined")
 _WHOLE_PROC = {"docker": ("--security-opt", "systempaths=unconfined"), "podman": ("--security-opt", "unmask=ALL")}
@@ -57,7 +60,17 @@ def run_in_container(
     name = program()
     image = build(name)
     make_folder(out)
-    return subprocess.run(command(name, image, assignment, submissions, out, options, mounted)).returncode
+    code = subprocess.run(command(name, image, assignment, submissions, out, options, mounted)).returncode
+    _tell_place(out / RECORD, assignment)
+    return code
+
+
+def _tell_place(record: Path, assignment: Path) -> None:
+    """The assignment's own place in the batch's record, in place of that in the container: a review reads it there."""
+    if record.is_file():
+        folder = assignment if assignment.is_dir() else assignment.parent
+        told = json.loads(record.read_bytes()) | {"folder": str(folder.resolve())}
+        write_whole(record, json.dumps(told, indent=1, sort_keys=True).encode() + b"\n")
 
 
 def command(

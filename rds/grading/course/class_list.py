@@ -63,10 +63,12 @@ class ClassList:
     def find(self, student: str, source: Mapping[str, Any] | None = None) -> Member | None:
         """Who handed in as `student`, of whom an export says `source`; None where that is nobody, or several.
 
-        The identifier decides, then number, e-mail address and name.
+        The identifier decides, then number, e-mail address and name. The number of a participant in Moodle is that of
+        one assignment, and no student's.
         """
         about = source or {}
-        said = [student, *(str(about[key]) for key in ("sid", "id", "email") if about.get(key))]
+        keys = ("sid", "email") if about.get("platform") == "moodle" else ("sid", "id", "email")
+        said = [student, *(str(about[key]) for key in keys if about.get(key))]
         names = [str(about["name"])] if about.get("name") else [student]
         return (
             self._one(said, lambda each: each.student)
@@ -113,7 +115,7 @@ def read_class_list(path: Path) -> ClassList:
         raise InputError(f"cannot be read: {error.strerror}; name the class list", str(path)) from error
     except UnicodeDecodeError as error:
         raise InputError("is no text in UTF-8; save it as CSV UTF-8", str(path)) from error
-    reader = rows_by_heading(text)
+    reader = rows_by_heading(text, str(path))
     columns = [name.strip() for name in reader.fieldnames or ()]
     if "student" not in columns or len(set(columns)) < len(columns) or not set(columns) <= set(COLUMNS):
         raise InputError(
@@ -149,9 +151,9 @@ def _member(row: Mapping[str, str], place: str) -> Member:
 
 
 def days(text: str, key: str, place: str) -> float:
-    """A number of days, 0 to 366. InputError for anything else."""
+    """A number of days, 0 to 366, with a point or a comma in it. InputError for anything else."""
     try:
-        value = float(text)
+        value = float(text.replace(",", "."))
     except ValueError:
         value = float("nan")
     if not (isfinite(value) and 0.0 <= value <= _MOST_DAYS):

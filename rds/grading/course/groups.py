@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from rds.grading.course.class_list import ClassList
 from rds.grading.grade import Status
@@ -47,7 +48,9 @@ def by_group(intake: Intake, listed: ClassList) -> Intake:
 
 def _of_group(name: str, rows: Sequence[HandedIn]) -> HandedIn:
     """What counts of all that a group's members handed in."""
-    by = {row.student: row.source for row in rows}
+    by: dict[str, Any] = {}
+    for row in rows:  # of a batch that is graded again the row is a group's already
+        by |= row.source.get("handed_in_by", {row.student: row.source})
     about = {"handed_in_by": by}
     given = [row for row in rows if row.status is not Status.MISSING]
     if not given:

@@ -16,7 +16,7 @@ from rds.grading.cases.case import LINEAR, Case, CaseRun
 from rds.grading.criteria import KINDS
 from rds.grading.criteria.bands import Bands
 from rds.grading.criteria.measuring import NotMeasured
-from rds.grading.grade import Band, CriterionScore
+from rds.grading.grade import Band, CriterionScore, with_unit
 
 DIGITS = 9  # of a value: so many are the same on every computer
 UNKNOWN = 0.5  # of the points, at most, where nothing could be measured; as a gate it leaves so much of them
@@ -122,8 +122,8 @@ class Criterion:
         way = "at most" if self.bands.more_is_worse else "at least"
         beyond = "from" if self.bands.more_is_worse else "at or below"
         tail = "on" if self.bands.more_is_worse else ""
-        nothing = f"none {beyond} {_number(self.bands.none, self.unit)} {tail}".rstrip()
-        return f"full points for {way} {_number(self.bands.full, self.unit)}, {nothing}"
+        nothing = f"none {beyond} {with_unit(self.bands.none, self.unit)} {tail}".rstrip()
+        return f"full points for {way} {with_unit(self.bands.full, self.unit)}, {nothing}"
 
     def _sentence(self, value: float, band: Band, share: float, earns: str = "earns") -> str:
         said = {
@@ -133,7 +133,7 @@ class Criterion:
             Band.REVIEW: "",
         }[band]
         # some meanings end with a comma, as they explain themselves
-        return f"{self.meaning} is {_number(value, self.unit)}, {said} ({self.bounds})."
+        return f"{self.meaning} is {with_unit(value, self.unit)}, {said} ({self.bounds})."
 
     def _scored(self, score: float, value: float | None, band: Band, sentence: str, case: str) -> CriterionScore:
         rounded = float(f"{score:.{DIGITS}g}")
@@ -257,7 +257,3 @@ def _requires(words: TomlTable, name: str) -> tuple[str, ...]:
     if name in given:
         raise words.fault("requires", "names the criterion itself")
     return tuple(given)
-
-
-def _number(value: float, unit: str) -> str:
-    return f"{value:.4g} {unit}".rstrip() if unit != "1" else f"{value:.4g}"

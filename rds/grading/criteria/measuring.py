@@ -76,12 +76,10 @@ def error_metric(run: CaseRun, name: str, options: Options) -> float:
 
 @dataclass(frozen=True)
 class Step:
-    """A response to a step from `start` to `final`: times from the step on (s), and the share of it that is done."""
+    """A response to a step: times from the step on (s), and the share of it that is done."""
 
     time: np.ndarray
     share: np.ndarray
-    size: float  # of the step, in the axis's unit
-    final: float
 
 
 STEP = {
@@ -108,7 +106,7 @@ def step_of(run: CaseRun, axis: str, options: Options) -> Step:
         raise NotMeasured(f"the reference of axis {axis} is no step: it changes again during the response")
     if size == 0.0:
         raise NotMeasured(f"axis {axis} has no step to make: it is where the reference is")
-    return Step(time[chosen] - begin, (position - position[0]) / size, abs(size), final)
+    return Step(time[chosen] - begin, (position - position[0]) / size)
 
 
 def crossing(step: Step, level: float) -> float:

@@ -64,22 +64,29 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
 
 
 def _heading(sheet: Sheet, item: str, finished: Finished, factor: float, wanted: ExportOptions) -> str:
-    """The item's column as Brightspace wrote it, if it is there and its points are ours."""
-    for name in sheet.columns:
-        found = _ITEM.fullmatch(name)
-        if found is None or found["name"].strip().casefold() != item.strip().casefold():
-            continue
-        most = _MOST.search(found["about"] or "")
+    """The item's column as Brightspace wrote it, if it is there once and its points are ours."""
+    called = [
+        (name, match["about"] or "")
+        for name in sheet.columns
+        if (match := _ITEM.fullmatch(name)) and match["name"].strip().casefold() == item.strip().casefold()
+    ]
+    if len(called) > 1:
+        said = ", ".join(repr(name) for name, _ in called)
+        raise InputError(
+            f"has several items {item!r} ({said}); leave the columns of all but one out of the export",
+            str(wanted.gradebook),
+        )
+    if not called and wanted.column is not None:
+        raise InputError(f"has no item {item!r}; there are {', '.join(sheet.columns)}", str(wanted.gradebook))
+    for name, about in called:
+        most = _MOST.search(about)
         if most and abs(float(most[1]) - finished.max_score * factor) > 1e-6 * max(1.0, float(most[1])):
             raise InputError(
                 f"MaxPoints of {item!r} are {most[1]}, and full marks are {finished.max_score * factor:g}; give "
-                "--points "
-                f"{most[1]} to have them scaled",
+                f"--points {most[1]} to have them scaled",
                 str(wanted.gradebook),
             )
         return name
-    if wanted.column is not None:
-        raise InputError(f"has no item {item!r}; there are {', '.join(sheet.columns)}", str(wanted.gradebook))
     return f"{item} Points Grade"
 
 

@@ -61,7 +61,7 @@ def _paths(place: Path, files: Mapping[str, bytes]) -> dict[Path, bytes]:
             if place.is_dir():
                 raise InputError("is a folder; name a file", str(place))
             return {place: data}
-    if files and place.suffix:
+    if files and place.suffix and not place.is_dir():
         raise InputError("would have to be a folder: there is a file for each student", str(place))
     return {place / name: data for name, data in files.items()}
 

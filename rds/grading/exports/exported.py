@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from math import inf
 from pathlib import Path
 
 from rds.core.errors import InputError
@@ -36,9 +37,11 @@ class Exported:
 
 
 def scale(finished: Finished, points: float | None) -> float:
-    """What every score is multiplied by."""
+    """What every score is multiplied by. InputError for points that would make every score 0, or no number."""
     if points is None:
         return 1.0
+    if not 0.0 < points < inf:
+        raise InputError(f"--points {points:g} must be a finite number above 0: what full marks are to be")
     if finished.max_score <= 0.0:
         raise InputError("--points cannot be used: the assignment has no points")
     return points / finished.max_score

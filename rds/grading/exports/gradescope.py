@@ -28,7 +28,7 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
 
 
 def results(grade: Grade, pictures: Sequence[Picture], factor: float = 1.0) -> dict[str, Any]:
-    """What Gradescope reads. What the grader could not grade has no score: Gradescope then says that it failed."""
+    """What Gradescope reads. Who could not be graded, or is excused, has no score: it then says that it failed."""
     shown = [f"<p>{escape(line)}</p>" for line in of_grade(grade).split("\n") if line]
     shown += [f'<p>{escape(p.label)}</p><img alt="{escape(p.label)}" src="{escape(p.url)}">' for p in pictures]
     if text := printed(grade):
@@ -40,7 +40,7 @@ def results(grade: Grade, pictures: Sequence[Picture], factor: float = 1.0) -> d
         "stdout_visibility": "hidden",
         "extra_data": {"status": str(grade.status), "late_days": grade.late_days, "sha256": grade.sha256},
     }
-    if grade.status is Status.GRADER_ERROR:
+    if grade.status in (Status.GRADER_ERROR, Status.EXCUSED):
         return found
     tests = [_test(score, number, factor) for number, score in enumerate(grade.criteria, 1)]
     return found | {"score": float(scaled(grade.score, factor)), "tests": tests}

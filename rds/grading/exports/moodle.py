@@ -21,7 +21,7 @@ USES = ("gradebook", "column", "points")
 _WORKSHEET = ("Identifier", "Grade", "Last modified (grade)")
 KEYS = (
     Key("Identifier", lambda grade: platform(grade, "moodle", "id"), lambda cell: cell.rpartition(" ")[2]),
-    Key("ID number", lambda grade: [grade.student, *source(grade, "sid", "id")]),
+    Key("ID number", lambda grade: [grade.student, *source(grade, "sid")]),
     Key("Email address", lambda grade: [*source(grade, "email"), grade.student]),
     Key("Full name", lambda grade: [*source(grade, "name"), grade.student], letters),
 )

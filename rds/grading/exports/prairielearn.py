@@ -14,7 +14,7 @@ from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import CriterionScore, Grade, Status
 
 FILE = "prairielearn"
-_NOT_GRADABLE = (Status.MISSING, Status.REFUSED, Status.FAILED_TO_LOAD, Status.GRADER_ERROR)
+_NOT_GRADABLE = (Status.MISSING, Status.REFUSED, Status.FAILED_TO_LOAD, Status.GRADER_ERROR, Status.EXCUSED)
 
 
 def export(finished: Finished, wanted: ExportOptions) -> Exported:

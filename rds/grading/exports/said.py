@@ -16,14 +16,15 @@ def of_criterion(score: CriterionScore) -> str:
 
 
 def of_grade(grade: Grade) -> str:
-    """Status, lateness and points, in lines."""
+    """Status, and lateness and points where there are some, in lines."""
     lines = []
     if grade.status is not Status.OK:
         lines.append(f"{grade.status}: {one_line(grade.reason, 1000)}")
+    if grade.status in (Status.GRADER_ERROR, Status.EXCUSED):
+        return lines[0]
     if grade.late_days > 0.0:
         lines.append(f"{grade.late_days:.3g} days late: {grade.before_penalty - grade.score:.4g} points are lost.")
-    if grade.status is not Status.GRADER_ERROR:
-        lines.append(f"{grade.score:.4g} of {grade.max_score:.4g} points.")
+    lines.append(f"{grade.score:.4g} of {grade.max_score:.4g} points.")
     return "\n".join(lines)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from rds.grading.criteria.bands import Bands
+from rds.grading.grade import with_unit
 
 _WIDTH, _BAR, _HEIGHT = 340, 12, 40  # px
 _TOP = 12  # px, of the bar: the mark stands above it
@@ -70,4 +71,4 @@ def _mark(value: float, first: float, last: float, scale: float) -> str:
 
 
 def _number(value: float, unit: str) -> str:
-    return escape(f"{value:.4g} {unit}".rstrip() if unit != "1" else f"{value:.4g}")
+    return escape(with_unit(value, unit))

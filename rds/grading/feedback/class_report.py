@@ -11,7 +11,7 @@ from urllib.parse import quote
 from rds.grading.batch.grades_table import criteria_of
 from rds.grading.feedback import histogram
 from rds.grading.feedback.plain_text import isolated, one_line
-from rds.grading.grade import Band, CriterionScore, Grade, Status
+from rds.grading.grade import Band, CriterionScore, Grade, Status, with_unit
 from rds.grading.review.applied import is_changed, of_review
 from rds.grading.review.entries import Kind, Review
 from rds.grading.review.everyone import SECTION
@@ -34,15 +34,13 @@ def class_page(
     *,
     seconds: Mapping[str, float] | None = None,
     similar: str = "",
-    missing: Sequence[str] = (),
     about: str = "",
     review: Review | None = None,
 ) -> Iterator[str]:
     """The page as HTML, piece by piece: a large class's need not have room in memory.
 
     `links` are the students' pages by identifier, as paths from this page; `seconds` is how long each submission took;
-    `similar` is HTML that points out submissions that are alike; `missing` are students without a grade; `review` is
-    what graders have said.
+    `similar` is HTML that points out submissions that are alike; `review` is what graders have said.
     """
     graded = [grade for grade in grades if grade.status not in (Status.GRADER_ERROR, Status.EXCUSED)]
     before, after = around(title)
@@ -50,7 +48,7 @@ def class_page(
     parts = (
         _STYLE,
         f'<header><h1>{escape(one_line(title))}</h1><p class="about">{escape(about)}</p></header>',
-        _first(grades, links, missing),
+        _first(grades, links),
         _summary(graded),
         _sections(graded),
         _distributions(graded),
@@ -63,15 +61,14 @@ def class_page(
     yield after
 
 
-def _first(grades: Sequence[Grade], links: Mapping[str, str], missing: Sequence[str]) -> str:
+def _first(grades: Sequence[Grade], links: Mapping[str, str]) -> str:
     """What the instructor has to look at: our own failures, and what could not be graded as it was meant."""
     parts = []
     ours = [grade.student for grade in grades if grade.status is Status.GRADER_ERROR]
-    again = [*ours, *(student for student in missing if student not in ours)]
-    if again:
-        names = ", ".join(isolated(student) for student in again)
+    if ours:
+        names = ", ".join(isolated(student) for student in ours)
         parts.append(
-            f'<p class="verdict missed"><strong>{len(again)} not graded</strong> by no fault of theirs; run the same '
+            f'<p class="verdict missed"><strong>{len(ours)} not graded</strong> by no fault of theirs; run the same '
             f"command again with --resume: {names}</p>"
         )
     review = [grade for grade in grades if grade.status is not Status.GRADER_ERROR and grade.for_review]
@@ -120,7 +117,7 @@ def _summary(graded: Sequence[Grade]) -> str:
         of = scores[criterion.name]
         counts = Counter(score.band for score in of)
         values = [score.value for score in of if score.value is not None]
-        middle = f"{median(values):.4g} {criterion.unit}".rstrip() if values else None
+        middle = with_unit(median(values), criterion.unit) if values else None
         row = [criterion.title, *_statistics([score.score for score in of]), criterion.max_score]
         rows.append([*row, middle, counts[Band.FULL], counts[Band.NONE]])
     columns = ["", "mean", "median", "lowest", "highest", "of points", "median value", "with full points", "with none"]

@@ -18,7 +18,7 @@ from rds.grading.feedback import band_bar, histogram
 from rds.grading.feedback.advice import advice
 from rds.grading.feedback.feedback_plots import case_picture
 from rds.grading.feedback.plain_text import isolated, one_line, plain
-from rds.grading.grade import Band, CriterionScore, Grade, Status
+from rds.grading.grade import Band, CriterionScore, Grade, Status, with_unit
 from rds.results.report import page
 
 LEAST_CLASS = 10  # students: of fewer, a distribution would tell whose points they are
@@ -60,13 +60,11 @@ def feedback_page(
     grade: Grade,
     runs: Sequence[CaseRun] = (),
     solution: Sequence[CaseRun] = (),
-    *,
-    same_plants: bool = True,
 ) -> str:
     """The page of one student as HTML.
 
-    `runs` are the runs that the grade rests on, `solution` those of the reference solution; `same_plants` says whether
-    both were on the same plants. What is hidden is only shown if the assignment says `feedback = "all"`.
+    `runs` are the runs that the grade rests on, `solution` those of the reference solution, on plants of its own.
+    What is hidden is only shown if the assignment says `feedback = "all"`.
     """
     shows_all = assignment.feedback == "all"
     title = f"{assignment.title}: {one_line(grade.student, 80)}"
@@ -76,7 +74,7 @@ def feedback_page(
         _advice(assignment, grade, runs),
         _marked("criteria", criteria_part(assignment, grade)),
         _marked("class", ""),
-        _runs(assignment, runs, solution, shows_all, same_plants),
+        _runs(assignment, runs, solution, shows_all),
         _notes(grade),
     ]
     return page(title, "\n".join(filter(None, parts)))
@@ -148,9 +146,10 @@ def _advice(assignment: Assignment, grade: Grade, runs: Sequence[CaseRun]) -> st
 def _total(grade: Grade) -> str:
     if grade.status is Status.GRADER_ERROR:
         return f'<p class="verdict void"><strong>not graded yet</strong> {_WHAT_IT_MEANS[grade.status]}</p>'
-    parts = [f'<p class="total">{grade.score:.4g} of {grade.max_score:.4g} points</p>']
+    is_excused = grade.status is Status.EXCUSED
+    parts = [] if is_excused else [f'<p class="total">{grade.score:.4g} of {grade.max_score:.4g} points</p>']
     lost = grade.before_penalty - grade.score
-    if grade.late_days > 0.0:
+    if grade.late_days > 0.0 and not is_excused:
         said = f"Handed in {grade.late_days:.3g} days after the due time: "
         said += (
             f"{lost:.4g} of the {grade.before_penalty:.4g} points earned are lost."
@@ -187,7 +186,7 @@ def _criterion(score: CriterionScore, criterion: Criterion | None, is_shown: boo
     )
     if not is_shown:
         return f'<div class="criterion"><div>{head} · hidden: its value is not shown</p></div></div>'
-    value = "" if score.value is None else f" · {_number(score.value, score.unit)}"
+    value = "" if score.value is None else f" · {escape(with_unit(score.value, score.unit))}"
     bar = "" if criterion is None else band_bar.band_bar(criterion.bands, score.value, score.unit)
     return (
         f'<div class="criterion"><div>{head}{value}</p><p>{escape(one_line(score.sentence, 1000))}</p></div>'
@@ -195,9 +194,7 @@ def _criterion(score: CriterionScore, criterion: Criterion | None, is_shown: boo
     )
 
 
-def _runs(
-    assignment: Assignment, runs: Sequence[CaseRun], solution: Sequence[CaseRun], shows_all: bool, same_plants: bool
-) -> str:
+def _runs(assignment: Assignment, runs: Sequence[CaseRun], solution: Sequence[CaseRun], shows_all: bool) -> str:
     parts = []
     for case in assignment.cases:
         if not (shows_all or case.is_visible):
@@ -206,7 +203,7 @@ def _runs(
         beside = [run for run in solution if run.case == case.name]
         picture = case_picture(of_case, beside, case.title)
         if picture is not None:
-            has_own = beside and not same_plants and case.is_drawn
+            has_own = beside and case.is_drawn
             own = " The reference solution ran on a plant of its own." if has_own else ""
             caption = escape(picture.caption + own)
             parts.append(
@@ -226,7 +223,3 @@ def _notes(grade: Grade) -> str:
     if grade.sha256:
         parts.append(f'<p class="note">SHA-256 of the file that was graded: {escape(grade.sha256)}</p>')
     return f"<section>{head}{''.join(parts)}</section>" if parts else ""
-
-
-def _number(value: float, unit: str) -> str:
-    return escape(f"{value:.4g} {unit}".rstrip() if unit != "1" else f"{value:.4g}")

@@ -36,7 +36,7 @@ def chosen(handed: StudentFiles, accepted: Sequence[str]) -> Item:
         names = ", ".join(sorted(shown(item.name) for item in files)[:5])
         raise NothingToGrade(f"there is no .py or .ipynb file in what was handed in ({names})")
     outermost = min(len(item.parts) for item in candidates)
-    named = [item for item in candidates if without_number(item.name)[0] in accepted]
+    named = [item for item in candidates if without_number(item.name, accepted)[0] in accepted]
     among = named or [item for item in candidates if len(item.parts) == outermost]
     keys = {id(item): _rank(item, handed, accepted) for item in among}
     best = max(keys.values())
@@ -73,7 +73,7 @@ def _are_copies(items: Sequence[Item]) -> bool:
 
 def _rank(item: Item, handed: StudentFiles, accepted: Sequence[str]) -> tuple[datetime, int, int, int]:
     """Newer first; then the number of the attempt; then the better name; then what lies in fewer folders."""
-    name, number = without_number(item.name)
+    name, number = without_number(item.name, accepted)
     when = item.time if handed.has_times and item.time is not None else _BEFORE_ALL
     place = accepted.index(name) if name in accepted else len(accepted)
     return when if when.tzinfo else when.replace(tzinfo=UTC), number, -place, -len(item.parts)

@@ -119,7 +119,7 @@ def rank(node: ast.AST | None, known: Known) -> int:
     if isinstance(node, ast.Call):
         return _of_call(node, known)
     if isinstance(node, ast.Attribute | ast.Subscript):
-        base = rank(node.value, known)
+        base = _of_base(node.value, known)
         if isinstance(node, ast.Subscript) and rank(node.slice, known) == CHANGES:
             return CHANGES
         if base == GIVES and not isinstance(node.ctx, ast.Load):
@@ -150,6 +150,16 @@ def rank(node: ast.AST | None, known: Known) -> int:
     return min(found, READS) if isinstance(node, _EXPRESSIONS) and found < CHANGES else found
 
 
+def _of_base(node: ast.expr, known: Known) -> int:
+    """The same of what has an attribute or an item: made where it stands, as `Tuner(params)`, it may hold the data."""
+    found = rank(node, known)
+    if found == READS and isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        given = [node.func, *node.args, *(word.value for word in node.keywords)]
+        if rank(node.func, known) == GIVES and any(rank(each, known) == GIVES for each in given[1:]):
+            return GIVES
+    return found
+
+
 def _items(node: ast.Dict) -> Iterator[tuple[ast.expr | None, ast.expr]]:
     return zip(node.keys, node.values, strict=True)
 
@@ -166,7 +176,7 @@ def _of_call(node: ast.Call, known: Known) -> int:
     if root(node.func) in known.modules and any(root(each) in known.absent for each in given):
         return NOTHING  # partial(run, params=params) of another module's run
     name = node.func.id if isinstance(node.func, ast.Name) else ""
-    base = rank(node.func.value, known) if isinstance(node.func, ast.Attribute) else rank(node.func, known)
+    base = _of_base(node.func.value, known) if isinstance(node.func, ast.Attribute) else rank(node.func, known)
     if base == CHANGES:
         return CHANGES
     last = node.func.attr if isinstance(node.func, ast.Attribute) else name
@@ -202,6 +212,9 @@ def effect(statement: ast.AST, known: Known) -> int:
         found = max(found, got)
         for target in targets:
             found = max(found, _bind(target, got, known))
+    for name, value in _put_into(statement):
+        if name and name not in known.absent and name not in known.modules:
+            _hold(name, value, known)
     if isinstance(statement, ast.Delete):
         if any(rank(each, known) >= GIVES for each in statement.targets):
             found = CHANGES
@@ -232,10 +245,36 @@ def _bindings(statement: ast.AST) -> Iterator[tuple[Sequence[ast.AST], ast.AST |
                 yield [item.optional_vars], item.context_expr
     elif isinstance(statement, ast.Match):
         yield [case.pattern for case in statement.cases], statement.subject
-    own = [child for child in ast.iter_child_nodes(statement) if not isinstance(child, ast.stmt)]
-    for node in chain.from_iterable(map(ast.walk, own)):
+    for node in _own(statement):
         if isinstance(node, ast.NamedExpr):
             yield [node.target], node.value
+
+
+def _own(statement: ast.AST) -> Iterator[ast.AST]:
+    """What a statement is made of, without the statements in it."""
+    own = [child for child in ast.iter_child_nodes(statement) if not isinstance(child, ast.stmt)]
+    return chain.from_iterable(map(ast.walk, own))
+
+
+def _put_into(statement: ast.AST) -> Iterator[tuple[str, ast.expr]]:
+    """What becomes part of what a name stands for: `steps.append(tune)`, `steps["tune"] = tune`, `steps += [tune]`."""
+    if isinstance(statement, ast.Assign):
+        yield from ((root(t), statement.value) for t in statement.targets if not isinstance(t, ast.Name))
+    elif isinstance(statement, ast.AugAssign):
+        yield root(statement.target), statement.value
+    for node in _own(statement):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            yield from ((root(node.func), each) for each in (*node.args, *(word.value for word in node.keywords)))
+
+
+def _hold(name: str, value: ast.expr, known: Known) -> None:
+    """`known` learns that `name` holds functions that change the data, or the data: no results of such functions."""
+    for each in value.elts if isinstance(value, ast.List | ast.Tuple | ast.Set) else [value]:
+        is_function = isinstance(each, ast.Lambda) or (isinstance(each, ast.Name) and each.id in known.functions)
+        if is_function and rank(each, known) == CHANGES:
+            known.code.add(name)
+        elif isinstance(each, ast.Name) and each is not value and rank(each, known) == GIVES:
+            known.data.add(name)
 
 
 def _bind(target: ast.AST, got: int, known: Known) -> int:

@@ -11,9 +11,11 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
+from rds.grading.intake.items import Item, Refusal
 from rds.grading.intake.names import shown
 
 METADATA = "submission_metadata.yml"
+_LARGEST = 64 << 20  # bytes; it holds all earlier results
 
 
 @dataclass(frozen=True)
@@ -26,8 +28,12 @@ class Submitter:
     note: str = ""
 
 
-def read_metadata(data: bytes) -> dict[str, Submitter]:
-    """Of each folder of an export its submitter. InputError if it is not what Gradescope writes."""
+def read_metadata(file: Item) -> dict[str, Submitter]:
+    """Of each folder of an export its submitter. InputError if it is not what Gradescope writes, or cannot be read."""
+    try:
+        data = file.read(_LARGEST)
+    except Refusal as error:
+        raise InputError(f"cannot be read: {error}", METADATA) from error
     with needed_for("reading it", where=METADATA):
         yaml = import_module("yaml")  # which has no types of its own
     # texts, lists and mappings only: results of earlier graders hold whatever types Ruby has, and a number keeps its 0

@@ -31,7 +31,6 @@ _PARTS = frozenset(
     {"code", "data", "doc", "docs", "lib", "notebooks", "old", "python", "source", "src", "test", "tests"}
 )
 _HANDED_IN, _DRAFTS = "Submitted files", "Working files"  # side by side in Teams
-_METADATA_LARGEST = 64 << 20  # bytes; Gradescope's holds all earlier results
 
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL)
 # students choose their names there, and files', and Moodle puts the number behind the name: of a folder the last counts
@@ -93,7 +92,7 @@ def sorted_out(
     items = [item for item in items if item is not times]
     metadata = next((item for item in items if item.parts == (METADATA,)), None)
     if metadata is not None:
-        submitters = read_metadata(metadata.read(_METADATA_LARGEST))
+        submitters = read_metadata(metadata)
         for item in items:
             if item is not metadata:
                 sorting.gradescope(item, submitters)
@@ -376,7 +375,7 @@ def _is_of_a_class(items: Sequence[Item], accepted: Sequence[str]) -> bool:
         at += 1
     alone = [item.name for item in handed_in if len(item.parts) == at]
     in_folders = {item.parts[at - 1] for item in handed_in if len(item.parts) > at}
-    is_one_s = any(without_number(name)[0] in accepted for name in alone)
+    is_one_s = any(without_number(name, accepted)[0] in accepted for name in alone)
     is_one_s |= bool(in_folders) and not alone and all(map(_is_part, in_folders))
     around = handed_in[0].parts[: at - 1]  # what the only one to hand in has in it says nothing of others
     is_one_s |= any(is_version(folder) or is_dated(folder) for folder in around)

@@ -185,14 +185,23 @@ def _fault(source: str) -> int | None:
 
 def _only(text: str, body: Sequence[ast.stmt], keep: set[int]) -> str:
     """The text with all other statements blanked out: lines keep their numbers."""
-    lines = text.split("\n")
+    lines = [_encoded(line) for line in text.split("\n")]  # columns are counted in bytes
     kept: set[int] = set()
     for number, statement in enumerate(body):
         decorators = getattr(statement, "decorator_list", [])
         first = min([statement.lineno, *(each.lineno for each in decorators)])
         if number in keep:
             kept |= set(range(first - 1, statement.end_lineno or first))
-    return "\n".join(line if n in kept or line.startswith("#") else "" for n, line in enumerate(lines))
+    for number, statement in reversed(list(enumerate(body))):
+        if number not in keep:  # behind or before a `;` of what is kept: the last first, or columns would be others
+            first, last = statement.lineno - 1, (statement.end_lineno or statement.lineno) - 1
+            before, behind = lines[first][: statement.col_offset], lines[last][statement.end_col_offset :]
+            if first in kept:
+                lines[first] = before + b"pass" + (behind if first == last else b"")
+            if last in kept and first != last:
+                lines[last] = b"pass" + behind
+    whole = (line.decode("utf-8", "surrogatepass") for line in lines)
+    return "\n".join(line if n in kept or line.startswith("#") else "" for n, line in enumerate(whole))
 
 
 def _encoded(text: str) -> bytes:

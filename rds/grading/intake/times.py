@@ -29,7 +29,7 @@ def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
         text = layout.times.read(_LARGEST).decode("utf-8-sig")
     except (Refusal, UnicodeDecodeError) as error:
         raise InputError(f"cannot be read: {error}; save it as UTF-8", TIMES) from error
-    reader = rows_by_heading(text)
+    reader = rows_by_heading(text, TIMES)
     if not {"student", "timestamp"} <= set(reader.fieldnames or ()):
         raise InputError("must have the columns student and timestamp, with a comma between them", f"{TIMES}: line 1")
     known, found = {handed.student for handed in layout.by_student}, {}

@@ -14,6 +14,7 @@ from rds.grading.batch.journal import Journal, read_journal
 from rds.grading.intake.layouts import TIMES
 from rds.grading.intake.names import safe_id
 from rds.grading.lti.registration import LAUNCHES
+from rds.grading.table_text import rows_by_heading
 
 _ENDINGS = (".py", ".ipynb")
 
@@ -73,7 +74,7 @@ def keep_submission(place: Path, launched: Launched, name: str, data: bytes) -> 
 def _stamp(path: Path, student: str) -> None:
     rows: dict[str, str] = {}
     if path.is_file():
-        reader = csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig")))
+        reader = rows_by_heading(path.read_text(encoding="utf-8-sig"), str(path))
         rows = {row["student"]: row["timestamp"] for row in reader}
     rows[student] = datetime.now(UTC).isoformat(timespec="seconds")
     stream = io.StringIO()

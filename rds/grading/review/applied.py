@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from statistics import mean
 from typing import Any
 
-from rds.grading.assignment.late_rules import LateRules
+from rds.grading.assignment.late_rules import LateRules, moved
 from rds.grading.course.class_list import Member
 from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import Band, CriterionScore, Grade, Status
@@ -43,7 +43,7 @@ def reviewed(grade: Grade, late: LateRules, member: Member | None, entries: Sequ
     left = member.late_days if member else None
     days, share, spent = grade.late_days, float(grade.details.get("late_share", 0.0)), 0
     if extension or left is not None:
-        days = max(0.0, grade.late_days - extension)
+        days = moved(grade.late_days, extension)
         share = late.lost(days, left)
     spent = late.spent(days, left) if extension or left is not None or not earlier else earlier["late_days_spent"]
     said: dict[str, Any] = {

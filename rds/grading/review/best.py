@@ -54,17 +54,26 @@ def best(batches: Sequence[Path], out: Path) -> Finished:
 
 
 def _best(finished: Sequence[Finished], student: str) -> tuple[int, Grade]:
-    """The number of the batch, and the grade in it. A grader error is no attempt if there is another one."""
+    """The number of the batch, and the grade in it. A grader error is no attempt if there is another one.
+
+    To have handed in nothing is none at all: beside it a grader error stands, and is no zero.
+    """
     found = [(n, grade) for n, each in enumerate(finished) for grade in each.grades if grade.student == student]
-    return min(found, key=lambda pair: (pair[1].status is Status.GRADER_ERROR, -pair[1].score, pair[0]))
+    rank = {Status.GRADER_ERROR: 1, Status.MISSING: 2}
+    return min(found, key=lambda pair: (rank.get(pair[1].status, 0), -pair[1].score, pair[0]))
 
 
 def _note(finished: Sequence[Finished], student: str, number: int) -> str:
     said = []
     for n, each in enumerate(finished):
-        score = next((f"{grade.score:g}" for grade in each.grades if grade.student == student), "none")
+        score = next((_points(grade) for grade in each.grades if grade.student == student), "none")
         said.append(f"{n + 1}: {score}{' (counts)' if n == number else ''}")
     return f"Points of {len(finished)} attempts: {', '.join(said)}."
+
+
+def _points(grade: Grade) -> str:
+    is_graded = grade.status not in (Status.GRADER_ERROR, Status.EXCUSED)
+    return f"{grade.score:g}" if is_graded else str(grade.status)
 
 
 def _copy(source: Finished, grade: Grade, out: Path) -> None:

@@ -17,7 +17,7 @@ from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.run import BatchOptions, grade_all
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.feedback.plain_text import cell, csv_line, one_line
-from rds.grading.grade import CriterionScore, Grade, Status
+from rds.grading.grade import CriterionScore, Grade, Status, with_unit
 from rds.grading.intake import HandedIn, Intake
 from rds.grading.intake.folders import read_regular
 from rds.grading.review.entries import FILE as REVIEW
@@ -28,6 +28,8 @@ from rds.results import html
 from rds.results.report import page
 
 TABLE, PAGE = "changes.csv", "changes.html"
+_WITHOUT_FILE = (Status.MISSING, Status.REFUSED, Status.EXCUSED, Status.GRADER_ERROR)
+_LOST = f"its {CODE} is not in the earlier batch any more; put it back, and go on with --resume"
 
 
 @dataclass(frozen=True)
@@ -109,18 +111,17 @@ def _why(was: Grade, now: Grade) -> list[str]:
 
 def _cause(old: CriterionScore, new: CriterionScore) -> str:
     """What differs, the deepest cause first: the value, what it is worth, a gate, else the bands."""
-    unit = "" if new.unit == "1" else f" {new.unit}"
     if old.value != new.value:
-        return f"because its value was {_value(old)}{unit} and is {_value(new)}{unit}"
+        return f"because its value was {_value(old)} and is {_value(new)}"
     if old.max_score != new.max_score:
         return f"because it was worth {old.max_score:g} points and is worth {new.max_score:g}"
     if old.gate != new.gate:
         return f"because of the gate {new.gate}" if new.gate else f"because the gate {old.gate} takes nothing now"
-    return f"because its bands are others (the same value, {_value(new)}{unit})"
+    return f"because its bands are others (the same value, {_value(new)})"
 
 
 def _value(score: CriterionScore) -> str:
-    return "not measured" if score.value is None else f"{score.value:.4g}"
+    return "not measured" if score.value is None else with_unit(score.value, score.unit)
 
 
 def _kept(before: Finished) -> Intake:
@@ -137,8 +138,9 @@ def _kept(before: Finished) -> Intake:
             name = name if name.endswith(".py") else CODE
             rows.append(replace(row, name=name, read=partial(read_regular, path, LARGEST)))
         else:
-            status = grade.status if grade.status in (Status.MISSING, Status.REFUSED) else Status.REFUSED
-            rows.append(replace(row, status=status, reason=grade.reason))
+            is_lost = grade.status not in _WITHOUT_FILE
+            status, reason = (Status.GRADER_ERROR, _LOST) if is_lost else (grade.status, grade.reason)
+            rows.append(replace(row, status=status, reason=reason))
     return Intake(str(before.record.get("layout", "kept")), tuple(rows))
 
 

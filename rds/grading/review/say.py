@@ -8,6 +8,7 @@ from pathlib import Path
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished, read_finished
 from rds.grading.feedback.plain_text import cell, csv_line, uncell
+from rds.grading.grade import with_unit
 from rds.grading.review.entries import Entry, Kind, add
 from rds.grading.review.publish import assignment_of, publish
 from rds.grading.table_text import rows_by_heading
@@ -57,7 +58,7 @@ def read_marks(path: Path, by: str, is_final: bool = False) -> list[Entry]:
         raise InputError(f"cannot be read: {error.strerror}; name the table of marks", str(path)) from error
     except UnicodeDecodeError as error:
         raise InputError("is no text in UTF-8; save it as CSV UTF-8", str(path)) from error
-    reader = rows_by_heading(text)
+    reader = rows_by_heading(text, str(path))
     if not {"student", "criterion"} <= set(reader.fieldnames or ()):
         raise InputError(
             f"must have the columns {', '.join(MARKS)}; --write-marks makes such a table", f"{path}: line 1"
@@ -83,12 +84,11 @@ def read_marks(path: Path, by: str, is_final: bool = False) -> list[Entry]:
 
 
 def marks_table(finished: Finished) -> bytes:
-    """A table for a grader to fill in: a line for each student and criterion, with what was measured in its last "
-    "columns."""
+    """A table for a grader to fill in: a line for each student and criterion, in its last columns what was measured."""
     rows: list[Iterable[str]] = [(*MARKS, "measured points", "of", "measured")]
     for grade in finished.grades:
         for score in grade.criteria:
-            value = "" if score.value is None else f"{score.value:.6g} {score.unit}".strip()
+            value = "" if score.value is None else with_unit(score.value, score.unit, 6)
             rows.append(
                 (grade.student, score.name, "", "", "", f"{score.score:g}", f"{score.max_score:g}", value or score.band)
             )

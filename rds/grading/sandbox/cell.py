@@ -59,12 +59,16 @@ class Cell:
         inner = (inner_questions, inner_answers, inner_output, *self.door, inner_status.detach())
         try:
             limits = {key: getattr(budget.limits, key) for key in budget.limits.__dataclass_fields__}
-            interpreter.fork({"limits": limits, "cpus": list(cpus)}, inner)
-        finally:
-            for descriptor in set(inner) - set(self.door):
-                os.close(descriptor)
-        self._process = self._started()
-        self._handle = os.pidfd_open(self._process)
+            try:
+                interpreter.fork({"limits": limits, "cpus": list(cpus)}, inner)
+            finally:
+                for descriptor in set(inner) - set(self.door):
+                    os.close(descriptor)
+            self._process = self._started()
+            self._handle = os.pidfd_open(self._process)
+        except BaseException:
+            self._close_ends()
+            raise
         supervisor.watch(self)
 
     def exchange(self, value: Any, seconds: float) -> Any:
@@ -186,8 +190,12 @@ class Cell:
         with self._lock:
             os.close(self._handle)
             self._handle = -1
-            for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door):
-                os.close(descriptor)
+            self._close_ends()
+
+    def _close_ends(self) -> None:
+        """The grader's ends of all channels."""
+        for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door):
+            os.close(descriptor)
         self._status.close()
 
     def _started(self) -> int:
@@ -200,9 +208,6 @@ class Cell:
         for level, kind, payload in ancillary:
             if data == b"started" and (level, kind) == (socket.SOL_SOCKET, socket.SCM_CREDENTIALS):
                 return int(_CREDENTIALS.unpack(payload)[0])
-        for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door):
-            os.close(descriptor)
-        self._status.close()
         raise SandboxError(f"the sandbox could not be put up: {data.decode(errors='replace') or 'it ended at once'}")
 
     def _end(self) -> None:

@@ -24,7 +24,6 @@ from rds.grading.sandbox.records import Layout
 
 SIZE = 4096  # bytes
 QUESTION, ANSWER = 512, 2048  # where the records are
-LARGEST_QUESTION, LARGEST_ANSWER = ANSWER - QUESTION, SIZE - ANSWER
 
 _ASKED, _ANSWERED = 16, 32  # the counters, as 8-byte words in cache lines of their own; beside each: who sleeps
 _LOOKS = 2000  # about 80 µs

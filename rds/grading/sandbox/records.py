@@ -15,7 +15,6 @@ END = 2  # an interpolator has no more rows
 
 TOTAL = (1 << 64) - 1  # in place of a sample's number: the run is over, tell what was counted
 ROWS = 64  # rows of an interpolator that are asked for at once
-MOST_AXES = 32
 
 
 @dataclass(frozen=True)

@@ -135,8 +135,8 @@ def rows(channel: Channel, student: StudentFile, order: dict[str, Any], counted:
         code = records.OK
         for _ in range(records.ROWS):
             try:
-                row = next(given, None)
-                if row is None:
+                row = next(given, given)  # not None, which a generator may yield
+                if row is given:
                     code = records.END
                     break
                 values = row_of(row, axes)
