@@ -140,3 +140,24 @@ def test_sources_are_the_files_that_may_be_called(tmp_path: Path) -> None:
     for name in ("b", "200", "3", "c"):
         (tmp_path / f"{name}.ngc").write_text("", encoding="utf-8")
     assert {path.name for path in sources(program)} == {"part.ngc", "a.ngc", "b.ngc", "200.ngc", "3.ngc"}
+
+
+@pytest.mark.parametrize(
+    "text, called",
+    [
+        ("M98 P1000", {"1000"}),
+        ("N10 m 098 L2 P 1 000 (twice)", {"1000"}),
+        ("O0200 CALL", {"200"}),
+        ("O< my  part > CALL", {"mypart"}),
+        ("O#1 CALL", {"200", "1000"}),  # whichever of the numbered ones
+        ("M98 P[#1 + 1]", {"200", "1000"}),
+        ("M3 (speed 1000) X8 Y9", set()),
+    ],
+)
+def test_sources_are_found_as_the_control_finds_them(tmp_path: Path, text: str, called: set[str]) -> None:
+    program = tmp_path / "part.ngc"
+    program.write_text(f"{text}\nM2\n", encoding="utf-8")
+    for name in ("200", "1000", "mypart", "8"):
+        (tmp_path / f"{name}.ngc").write_text("", encoding="utf-8")
+    found = {path.stem for path in sources(program)} - {"part"}
+    assert found == (called | {"8"} if len(called) > 1 else called)
