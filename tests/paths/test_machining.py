@@ -288,3 +288,19 @@ def test_the_commands_list_layers_make_and_cut(folder: Path) -> None:
     assert (folder / "part-cut.png").exists()
     again = run.invoke(app, [*words, "--part", str(folder / "cut.npz")])
     assert json.loads(again.stdout)["part"]["highest_mm"] == 0.0
+
+
+@pytest.mark.parametrize("depth, step_down", [(3.0, 1.0), (4.0, 0.8), (2.0, 2.0), (5.0, 0.5)])
+def test_tabs_have_their_width_wherever_the_ramps_ended(tmp_path: Path, depth: float, step_down: float) -> None:
+    (tmp_path / "tools.toml").write_text(TOOLS)
+    (tmp_path / "plate.svg").write_text(SVG)
+    (tmp_path / "job.toml").write_text(
+        'drawing = "plate.svg"\ntools = "tools.toml"\n[[operation]]\ndo = "contour"\nlayer = "outline"\ntool = 1\n'
+        f"depth = {depth}\nstep_down = {step_down}\ntabs = 7\ntab_width = 3.0\ntab_height = 1.3\n"
+    )
+    (piece,) = read_job(tmp_path / "job.toml").cuts[0].pieces
+    roof = 1.3 - depth
+    passes = len({round(segment.end[2], 9) for segment in piece if segment.end[2] < roof})
+    over = [segment for segment in piece if abs(segment.start[2] - roof) + abs(segment.end[2] - roof) < 1e-9]
+    length = sum(float(np.hypot(*np.subtract(segment.end[:2], segment.start[:2]))) for segment in over)
+    assert length == pytest.approx(7 * passes * 6.0, rel=1e-3)  # of each tab with the tool, in each pass

@@ -13,7 +13,18 @@ from rds.core.errors import InputError
 from rds.core.quantities import Choice, Declaration, Flag, Items, Quantity, Table, Text
 from rds.nc.language.tool_library import ShapedTool
 from rds.nc.machining.area import area_of, nearest_order, offset, pocket_rings, polygons, rings
-from rds.nc.machining.ways import Piece, at_height, levels, lines, path, ramp, ring_at, ring_with_tabs
+from rds.nc.machining.ways import (
+    Piece,
+    along,
+    at_height,
+    levels,
+    lines,
+    path,
+    ramp,
+    rest_of_tab,
+    ring_at,
+    ring_with_tabs,
+)
 from rds.nc.shapes.centre_lines import centre_lines
 from rds.nc.shapes.curves import Curve, Drawing
 
@@ -246,6 +257,10 @@ def _contour(cut: Cut, given: dict[str, Any], drawing: Drawing | None, tolerance
         before, start, piece = given["top"], 0.0, []  # type: float, float, Piece
         for z in heights:
             if tabs and z < roof - 1e-9:
+                on = rest_of_tab(start, tabs, total)
+                if on and piece:  # at the height before, where the ring has been cut
+                    piece += path(at_height(along(ring, start, on), before), feed, tolerance)
+                start = (start + on) % total
                 down = lines([(*_place(ring, start), before), (*_place(ring, start), z)], plunge)
                 piece += down + ring_with_tabs(ring, start, z, tabs, roof, feed, plunge, tolerance)
             else:
@@ -259,15 +274,11 @@ def _contour(cut: Cut, given: dict[str, Any], drawing: Drawing | None, tolerance
 
 
 def _place(ring: np.ndarray, start: float) -> np.ndarray:
-    from rds.nc.machining.ways import along
-
     return along(ring, start, 1e-6)[0]
 
 
 def _turned(ring: np.ndarray, start: float) -> np.ndarray:
     """The ring, beginning at the distance `start` along it."""
-    from rds.nc.machining.ways import along
-
     return along(ring, start, float(np.hypot(*np.diff(ring, axis=0).T).sum()))
 
 
