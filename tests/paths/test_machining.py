@@ -304,3 +304,15 @@ def test_tabs_have_their_width_wherever_the_ramps_ended(tmp_path: Path, depth: f
     over = [segment for segment in piece if abs(segment.start[2] - roof) + abs(segment.end[2] - roof) < 1e-9]
     length = sum(float(np.hypot(*np.subtract(segment.end[:2], segment.start[:2]))) for segment in over)
     assert length == pytest.approx(7 * passes * 6.0, rel=1e-3)  # of each tab with the tool, in each pass
+
+
+def test_holes_are_written_to_the_last_decimal(tmp_path: Path) -> None:
+    (tmp_path / "tools.toml").write_text(TOOLS)
+    (tmp_path / "job.toml").write_text(
+        'tools = "tools.toml"\nsafe = 1234.5678\nblend = 0.00002\n[[operation]]\ndo = "drill"\ntool = 2\n'
+        "depth = 2.34567\ndwell = 0.00005\nplunge = 1234567.0\nspindle = 1234567.0\n"
+        "at = [123.4567, -1000.1234]\ngrid = [1, 2, 0.0, 0.0001]\n"
+    )
+    text = read_job(tmp_path / "job.toml").program()
+    assert "G99 G82 P0.00005 X123.4567 Y-1000.1234 Z-2.3457 R0.5 F1234567\nX123.4567 Y-1000.1233\n" in text
+    assert "G64 P0.00002\n" in text and "S1234567 M3\nG0 Z1234.5678\n" in text
