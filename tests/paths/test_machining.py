@@ -102,6 +102,11 @@ def carved(folder: Path, name: str = "job.toml", cell: float = 0.1) -> tuple[Car
     return carving, stock
 
 
+def test_an_svg_takes_no_unit(folder: Path) -> None:
+    with pytest.raises(InputError, match=r"plate\.svg.*says its own size; leave the unit out"):
+        read_vector_drawing(str(folder / "plate.svg"), "in")
+
+
 def test_an_svg_is_read_in_mm_upwards_with_its_layers_and_transforms(folder: Path) -> None:
     drawing = read_vector_drawing(str(folder / "plate.svg"))
     assert drawing.layers == ["outline", "pocket", "holes"]
@@ -265,6 +270,12 @@ def test_what_a_photograph_leaves_never_hangs_together_at_a_corner(seed: int) ->
         (('layer = "holes"', 'layer = "hole"'), "did you mean 'holes'"),
         (("depth = 2", "depth = 2\nstep_over = 0.9"), "at most 0.5"),
         (('tools = "tools.toml"', 'tools = "tools.toml"\nsafe = 0'), "below the clearance"),
+        (('drawing = "plate.svg"\n', ""), "is of a drawing, and there is none"),
+        (('drawing = "plate.svg"\n', 'unit = "in"\ntext = { text = "A" }\n'), "is of a drawing in a file"),
+        (("peck = 1", "peck = 1\nat = [1.0, 2.0]"), "leave at out, or layer"),
+        (("peck = 1", "peck = 1\ndwell = 0.5"), "does not dwell"),
+        (('layer = "holes"\n', "grid = [-2, -1, 1.0, 1.0]\n"), "two whole numbers of holes, from 1"),
+        (("tabs = 3", 'side = "on"\nstock_to_leave = 0.1'), "nothing is left beside"),
     ],
 )
 def test_faults_of_a_job_name_their_place(folder: Path, change: tuple[str, str], said: str) -> None:

@@ -161,6 +161,9 @@ def _drawing(top: TomlTable, folder: Path) -> Drawing | None:
     text, file = top.inner("text"), top.read("drawing")
     if text is not None and file is not None:
         raise top.fault("drawing", "and [text] are two drawings; leave one out")
+    for key in ("unit",) if text is not None else () if file is not None else ("unit", "origin", "at"):
+        if key in top:
+            raise top.fault(key, f"is of a drawing{' in a file' * (text is not None)}, and there is none; leave it out")
     unit = top.read("unit")
     found: Drawing | None = None
     if text is not None:
