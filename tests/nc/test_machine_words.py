@@ -125,6 +125,20 @@ def test_steps_tell_the_words_in_force_after_each_line() -> None:
         list(steps("G21\nG12 X1\nM2\n"))
 
 
+def test_steps_tell_each_change_of_a_parameter_once() -> None:
+    text = "#1=5\n#1=0\n#<_g>=1\n#<a>=2\no1 sub\n#<_g>=3\no1 endsub\no1 call [4]\n#<a>=0\nM2\n"
+    found = [(step.line, dict(step.changed)) for step in steps(text, parameters={33: 2.0}) if step.changed]
+    assert found == [
+        *((1, {"#1": 5.0}), (2, {"#1": 0.0}), (3, {"#<_g>": 1.0}), (4, {"#<a>": 2.0})),
+        *((8, {"#1": 4.0}), (6, {"#<_g>": 3.0}), (7, {"#1": 0.0}), (9, {"#<a>": 0.0})),
+    ]
+    seen = []
+    with pytest.raises(ProgramError, match="G12"):
+        for step in steps("#1=1\n#2=2\nG12 X1\nM2\n"):
+            seen += [step.line]
+    assert seen == [1, 2]
+
+
 def test_what_holds_a_motion_back_adds_up_and_a_raised_limit_saves_a_second(tmp_path: Path) -> None:
     part = program(tmp_path, "G21 G90 G94\nG0 X60\nX-60\nX60\nX-60\nG1 X-50 F600\nM2\n")
     machine = load_machine("mini-cnc")
