@@ -22,6 +22,15 @@ def test_it_reaches_its_goal_within_its_limits(goal: float, speed: float, accele
     assert (x, v) == (goal, 0.0)
 
 
+def test_a_slow_axis_that_gains_its_speed_at_once_does_not_leap_at_its_goal() -> None:
+    x, v, places = 0.0, 0.0, [0.0]
+    while x != 0.005:
+        x, v = advance(x, v, 0.005, 0.5, 5000.0, T)
+        places.append(x)
+    assert max(b - a for a, b in zip(places, places[1:], strict=False)) <= 0.5 * T * (1 + 1e-9)
+    assert len(places) == 6
+
+
 @given(v=st.floats(-15, 15), acceleration=st.floats(5, 500))
 def test_let_go_it_rests_after_the_time_that_its_deceleration_takes(v: float, acceleration: float) -> None:
     x, samples = 0.0, 0
