@@ -61,6 +61,7 @@ FAULTS = [
     ("G90.1 F1 G2 I5 X10\nM2", 1, 10, "G2", "J is missing; an absolute centre (G90.1) needs I and J"),
     ("G93 G1 X1\nM2", 1, 5, "G1", "in inverse time (G93) every move by feed needs F"),
     ("F9 G1 X1\nG93\n (on) Y2 X3\nM2", 3, 7, "Y2", "G1 is still in force: in inverse time (G93) every move"),
+    ("F9 G38.2 Z-5\nG41.1 D3\nZ-6\nM2", 3, 1, "Z-6", "G38.2 is still in force: probing does not go with cutter"),
     ("F9 G2 I1\nN5 X[1 + 2] Y3\nM2", 2, 4, "X", "G2 is still in force: an arc needs its centre (I and J in G17)"),
     ("G95 F.1 G1 X1\nM2", 1, 9, "G1", "the spindle's speed is 0; write S"),
     ("G4\nM2", 1, 1, "G4", "write the dwell in seconds"),
