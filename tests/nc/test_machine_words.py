@@ -19,6 +19,7 @@ from rds.core.errors import InputError
 from rds.interpolators.motion.limiting import explained
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import plan
+from rds.interpolators.motion.segments import chain, line
 from rds.machines import load_machine
 from rds.machines.machine import Machine
 from rds.nc import ProgramError, steps
@@ -152,6 +153,16 @@ def test_what_holds_a_motion_back_adds_up_and_a_raised_limit_saves_a_second(tmp_
     raised[0] = rows[0]["to_save_a_second"]
     faster = sum(map(len, plan(blocks, replace(limits, velocity=raised), 0.001, start=np.zeros(6))))
     assert 1.0 <= (len(found.time) - faster) * 0.001 < 1.2
+
+
+def test_a_rotary_axis_alone_is_held_back_by_its_feed_or_its_limits() -> None:
+    limits = Limits.from_axes({"X": (50.0, 500.0, 5000.0), "A": (90.0, 900.0, 9000.0)})
+    there, back = line([0.0] * 6, [0.0] * 3 + [45.0, 0.0, 0.0], 30.0), line([0.0] * 3 + [45.0], [0.0], 1.0, rapid=True)
+    found = explained([PathBlock(chain(there, back))], limits, 0.01, 1)
+    assert found.limiting.seconds["programmed feed"] == pytest.approx(1.5, abs=0.1)
+    assert found.limiting.seconds["at rest"] < 0.05
+    assert {row["unit"] for row in found.rows if "unit" in row} <= {"degrees/s", "degrees/s²", "degrees/s³"}
+    assert any("degrees/s" in said for said in found.savings())
 
 
 def test_the_certificate_of_a_run_shows_what_holds_it_back(tmp_path: Path) -> None:
