@@ -91,6 +91,28 @@ def test_refusals(path: list, said: str) -> None:
         interpolate(path, T)
 
 
+@pytest.mark.parametrize(
+    ("rests", "said"),
+    [({3: 1.0}, "no segment 3 .*to 2"), ({-2: 1.0}, "no segment -2"), ({0: -1.0}, "from 0"), ({0: np.nan}, "finite")],
+)
+def test_rests_that_there_are_not(rests: dict[int, float], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        interpolate(KEYHOLE, T, rests=rests)
+
+
+def test_lines_and_arcs_have_one_basic_length_unit() -> None:
+    fine, coarse = (library_interpolator("reference-pulse", blu=blu) for blu in (0.002, 0.01))
+    with pytest.raises(InputError, match=r"a BLU each, 0\.002 and 0\.01 mm; give both the same"):
+        interpolate(KEYHOLE, T, lines=fine, arcs=coarse)
+    assert interpolate(KEYHOLE[:1], T, lines=fine, arcs=coarse).blu == 0.002
+
+
+@pytest.mark.parametrize(("feed", "period"), [(0.0, T), (1.0, 0.0)])
+def test_rows_of_what_cannot_be_are_refused_as_a_path_is(feed: float, period: float) -> None:
+    with pytest.raises(InputError, match="above 0"):
+        library_interpolator().rows(LineSegment((0.0,), (1.0,), feed), period)
+
+
 def test_axes_are_named() -> None:
     line = [LineSegment((0.0, 0.0), (1.0, 1.0), 1.0)]
     assert interpolate(line, T, axes=("Y", "Z")).axes == ("Y", "Z")

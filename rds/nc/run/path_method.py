@@ -12,7 +12,7 @@ from rds.core.errors import InputError
 from rds.core.geometry import length
 from rds.core.types import ArcSegment, Segment
 from rds.interpolators.acceleration import Acceleration, smooth_one_by_one
-from rds.interpolators.interpolator import Interpolator
+from rds.interpolators.interpolator import Interpolator, common_blu
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.segments import AXES
 from rds.interpolators.path import check_chain
@@ -60,12 +60,13 @@ def program_of(
     check_room(segments, lines, machine, axes)
     weights = method.acceleration.weights(T) if method.acceleration else np.ones(1)
     lines_by, arcs_by = method.interpolator, method.arcs or method.interpolator
+    blu = common_blu(method.interpolators)
     ends = set(due) | (set(range(len(segments))) if method.exact_stop else set()) | {len(segments) - 1}
     stretches, begin, samples = [], 0, 1
     for end in sorted(ends):
         part = tuple(segments[begin : end + 1])
         happens = tuple(due.get(end, ()))
-        stretches.append(Stretch(_Rows(part, begin, lines_by, arcs_by, weights, T), happens))
+        stretches.append(Stretch(_Rows(part, begin, lines_by, arcs_by, weights, blu, T), happens))
         samples += sum(ceil(length(each) / each.feed_rate / T - 1e-9) for each in part) + len(weights) - 1
         samples += sum(dwell_samples(each.value, T) for each in happens if each.kind == "dwell")
         begin = end + 1
@@ -110,11 +111,11 @@ class _Rows:
     lines: Interpolator
     arcs: Interpolator
     weights: np.ndarray
+    blu: float | None
     T: float
 
     def __call__(self) -> Iterator[Row]:
         number = self.first - 1
-        blu = next((each.blu for each in (self.lines, self.arcs) if each.blu is not None), None)
 
         def made() -> Iterator[np.ndarray]:
             nonlocal number
@@ -126,5 +127,5 @@ class _Rows:
         if len(self.weights) > 1:
             rows = smooth_one_by_one(rows, self.segments[0].start, self.weights, self.T)
         for position, velocity, acceleration in rows:
-            at = position if blu is None else np.rint(position / blu) * blu
+            at = position if self.blu is None else np.rint(position / self.blu) * self.blu
             yield at.tolist(), velocity.tolist(), acceleration.tolist(), number
