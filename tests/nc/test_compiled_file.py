@@ -161,3 +161,13 @@ def test_sources_are_found_as_the_control_finds_them(tmp_path: Path, text: str, 
         (tmp_path / f"{name}.ngc").write_text("", encoding="utf-8")
     found = {path.stem for path in sources(program)} - {"part"}
     assert found == (called | {"8"} if len(called) > 1 else called)
+
+
+def test_the_last_line_may_name_all_tools_of_a_table(tmp_path: Path) -> None:
+    part, table = tmp_path / "part.ngc", tmp_path / "tools.tbl"
+    table.write_text("".join(f"T{99000 + k} P{k}\n" for k in range(1, 1001)), encoding="utf-8")
+    part.write_text("".join(f"T{99000 + k} M6\n" for k in range(1, 1001)) + "G0 X1\nM2\n", encoding="utf-8")
+    how = Setup(tools=table)
+    assert check_program(part, MACHINE, how)[0].ok
+    found = compiled_if_current(part, MACHINE, how)
+    assert found is not None and len(found.trailer["tools"]) == 1000
