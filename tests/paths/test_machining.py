@@ -12,11 +12,13 @@ from typer.testing import CliRunner
 
 from rds.cli.main import app
 from rds.core.errors import InputError
+from rds.interpolators.motion.segments import chain, line
 from rds.machines import load_machine
 from rds.nc.check import motion
 from rds.nc.language.tool_library import ShapedTool, read_library
 from rds.nc.machining.area import area_of, pocket_rings
 from rds.nc.machining.job import read_job
+from rds.nc.path_block import PathBlock
 from rds.nc.paths.region import mended
 from rds.nc.setup import Setup
 from rds.nc.shapes.centre_lines import centre_lines
@@ -315,6 +317,23 @@ def test_tabs_have_their_width_wherever_the_ramps_ended(tmp_path: Path, depth: f
     over = [segment for segment in piece if abs(segment.start[2] - roof) + abs(segment.end[2] - roof) < 1e-9]
     length = sum(float(np.hypot(*np.subtract(segment.end[:2], segment.start[:2]))) for segment in over)
     assert length == pytest.approx(7 * passes * 6.0, rel=1e-3)  # of each tab with the tool, in each pass
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 and nothing more", b"heights"])
+def test_a_file_that_no_cut_has_saved_is_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "part.npz").write_bytes(content)
+    with pytest.raises(InputError, match=r"part\.npz.*holds no heights that a cut has saved"):
+        Stock.block((0, 0, 0), (1, 1, 1), 0.5).part(tmp_path / "part.npz")
+
+
+def test_the_line_in_which_a_rotary_axis_turns_is_named() -> None:
+    rows = chain(line([0.0] * 3, [5.0], 1.0, program_line=3), line([5.0], [5.0, 0, 0, 90.0], 1.0, program_line=8))
+    carving = Carving(Stock.block((0, 0, -1), (1, 1, 0), 0.5), {1: ShapedTool(1, 3.0)})
+    with pytest.raises(InputError, match="line 8: rotary axes move"):
+        carving.program([PathBlock(rows, tool=1)])
+    rows["end"], rows["rapid"] = [[5.0, 0, 0, 0, 0, 0]] * 2, [True, False]
+    with pytest.raises(InputError, match="line 8: cuts with tool 2"):
+        carving.program([PathBlock(rows, tool=2)])
 
 
 def test_holes_are_written_to_the_last_decimal(tmp_path: Path) -> None:

@@ -101,12 +101,13 @@ class Carving:
 
     def _block(self, block: PathBlock, spindle: np.ndarray) -> None:
         rows = block.segments
-        if (rows["tip"] != JOINTS).any() or (rows["start"][:, 3:] != rows["end"][:, 3:]).any():
-            line = int(rows["line"][0])
+        turns = (rows["tip"] != JOINTS) | (rows["start"][:, 3:] != rows["end"][:, 3:]).any(axis=1)
+        if turns.any():
+            line = int(rows["line"][turns.argmax()])
             raise InputError(f"line {line}: rotary axes move; a height field is cut from above, by X, Y and Z alone")
         if block.tool not in self.tools and not (~rows["rapid"]).any():
             return  # before the first tool change
-        tool = self.tool(block.tool, int(rows["line"][0]))
+        tool = self.tool(block.tool, int(rows["line"][(~rows["rapid"]).argmax()]))
         points, owner = sample(rows, ARC_STEP)
         points = np.vstack((rows["start"][0, :3], points)) - (0.0, 0.0, tool.length)
         owner = np.concatenate((owner[:1], owner))
