@@ -15,6 +15,7 @@ from rds.interpolators.deviation import distances
 from rds.interpolators.interpolator import find_interpolator, library_interpolator
 from rds.interpolators.path import interpolate
 from rds.interpolators.plots import pictures
+from rds.interpolators.segment_rows import segments_of
 from rds.results import open_result
 
 T = 0.01
@@ -105,6 +106,12 @@ def test_lines_and_arcs_have_one_basic_length_unit() -> None:
     with pytest.raises(InputError, match=r"a BLU each, 0\.002 and 0\.01 mm; give both the same"):
         interpolate(KEYHOLE, T, lines=fine, arcs=coarse)
     assert interpolate(KEYHOLE[:1], T, lines=fine, arcs=coarse).blu == 0.002
+
+
+@pytest.mark.parametrize("end", [[10**400, 0.0], [float("nan"), 0.0], [float("inf"), 0.0]])
+def test_a_row_whose_end_is_no_place_is_refused(end: list[float]) -> None:
+    with pytest.raises(InputError, match=r"segment 1: end = .* must be one to six positions"):
+        segments_of((0.0, 0.0), [{"kind": "line", "end": end}], 1.0, "mm/s")
 
 
 @pytest.mark.parametrize(("feed", "period"), [(0.0, T), (1.0, 0.0)])
