@@ -19,7 +19,7 @@ from rds.interpolators.path import check_chain
 from rds.machines import Machine
 from rds.modes.loop.interpolated import LEAST_AHEAD
 from rds.modes.loop.program import InterpolatedProgram, ProgramEvent, Row, Stretch, dwell_samples
-from rds.nc.run.path_segments import check_room, in_machine_axes
+from rds.nc.run.path_segments import in_room
 
 MOST_SAMPLES = 20_000_000
 
@@ -57,7 +57,7 @@ def program_of(
 ) -> InterpolatedProgram:
     """The program of these segments; `due` says after which of them the axes rest, and what happens there."""
     check_chain(segments, T)
-    check_room(segments, lines, machine, axes)
+    path = in_room(segments, lines, machine, axes)
     weights = method.acceleration.weights(T) if method.acceleration else np.ones(1)
     lines_by, arcs_by = method.interpolator, method.arcs or method.interpolator
     blu = common_blu(method.interpolators)
@@ -89,7 +89,7 @@ def program_of(
         home=(0.0,) * len(axes),
         limits=np.array([limits.velocity, limits.acceleration, limits.jerk])[:, order],
         travel=np.array([machine.axes[each].travel for each in axes], dtype=float),
-        path=in_machine_axes(segments, lines, order),
+        path=path,
         about={
             "interpolator": ", arcs by ".join(each.name for each in method.interpolators),
             "interpolator_params": dict(method.interpolator.params),
