@@ -56,11 +56,11 @@ class Resting:
             self._line = int(path["line"][0]) if len(path) else 0
             self._stay(1)
         self._happen(events, -1)
+        met = {event.after for event in events}
         k = 0
         while k < len(path):
             upto = k + 1
             limit = len(path) if most is None else min(k + most, len(path))
-            met = {event.after for event in events}
             while upto < limit and upto - 1 not in met:
                 upto += 1
             if path["length"][k:upto].any():
