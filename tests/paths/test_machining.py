@@ -336,6 +336,13 @@ def test_the_line_in_which_a_rotary_axis_turns_is_named() -> None:
         carving.program([PathBlock(rows, tool=2)])
 
 
+def test_a_fault_is_told_once_for_a_line_with_its_largest_value() -> None:
+    carving = Carving(Stock.block((0, 0, -1), (1, 1, 0), 0.5), {})
+    for line_number, kind, value in ((3, "rapid", 1.0), (3, "table", 2.0), (3, "rapid", 4.0), (3, "rapid", 2.0)):
+        carving._fault(line_number, kind, value)
+    assert [(fault.line, fault.kind, fault.value) for fault in carving.faults] == [(3, "rapid", 4.0), (3, "table", 2.0)]
+
+
 def test_holes_are_written_to_the_last_decimal(tmp_path: Path) -> None:
     (tmp_path / "tools.toml").write_text(TOOLS)
     (tmp_path / "job.toml").write_text(

@@ -79,6 +79,7 @@ class Carving:
     loads: dict[int, ToolLoad] = field(default_factory=dict)
     faults: list[CutFault] = field(default_factory=list)
     spindle: float = 0.0  # rev/min
+    _known: dict[tuple[int, str], int] = field(default_factory=dict)  # places in `faults`, by line and kind
 
     def tool(self, number: int, line: int = 0) -> ShapedTool:
         """A tool of the library. InputError where it has none of this number."""
@@ -171,11 +172,11 @@ class Carving:
 
     def _fault(self, line: int, kind: str, value: float) -> None:
         """One for each line and kind, with the largest value."""
-        for k, fault in enumerate(self.faults):
-            if fault.line == line and fault.kind == kind:
-                self.faults[k] = CutFault(line, kind, max(value, fault.value))
-                return
-        self.faults.append(CutFault(line, kind, value))
+        k = self._known.setdefault((line, kind), len(self.faults))
+        if k == len(self.faults):
+            self.faults.append(CutFault(line, kind, value))
+        elif value > self.faults[k].value:
+            self.faults[k] = CutFault(line, kind, value)
 
 
 @dataclass(frozen=True)
