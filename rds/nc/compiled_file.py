@@ -40,6 +40,8 @@ def beside(program: Path) -> Path:
 
 def is_ours(path: Path) -> bool:
     """Whether a file is a compiled program, of whatever format, and no data of someone else."""
+    if not path.is_file():
+        return False
     with path.open("rb") as stream:
         return stream.read(len(MAGIC) - 2) == MAGIC[:-2]
 

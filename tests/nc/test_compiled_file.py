@@ -109,6 +109,12 @@ def test_a_file_of_someone_else_is_neither_overwritten_nor_removed(part: Path) -
     assert compiled_if_current(part, MACHINE, setup(part)) is None
 
 
+def test_a_folder_where_the_compiled_form_would_be_is_none(part: Path) -> None:
+    part.with_suffix(".dat").mkdir()
+    with pytest.raises(InputError, match=r"part\.dat.*rename or move it"):
+        check_program(part, MACHINE, setup(part))
+
+
 def test_a_program_may_not_bear_the_name_of_the_compiled_form(part: Path) -> None:
     program = part.rename(part.with_suffix(".DAT"))
     with pytest.raises(InputError, match=r"rename the program"):
