@@ -16,7 +16,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.interpolators.motion.planner import TOLERANCE
-from rds.interpolators.motion.segments import BLEND, JOINTS, LINE, MOVED, SEGMENT, TILTED, points_at
+from rds.interpolators.motion.segments import BLEND, JOINTS, LINE, MOVED, SEGMENT, TILTED, pieces, points_at
 from rds.machines import Machine
 from rds.machines.kinematics.tip import Tip
 from rds.nc.language.frame import only_rotary
@@ -105,7 +105,7 @@ class ToolCentre:
         count = self._first_count(segments)
         share = self._share(segments, before, joints)
         for _ in range(_ROUNDS):
-            owner, u = _nodes(count)
+            owner, u = pieces(count)
             made = self.bring(
                 np.concatenate([points_at(segments[:1], u[:1] * 0.0), points_at(segments[owner], u)]), before, joints
             )
@@ -198,13 +198,6 @@ class ToolCentre:
         rows["tip"] = np.where(tilted, TILTED, MOVED)[owner]
         rows["tool_length"] = self.length
         return rows
-
-
-def _nodes(count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of the end of each chord: which move it is of, and the share of that move's way."""
-    owner = np.repeat(np.arange(len(count)), count)
-    first = np.cumsum(count) - count
-    return owner, (np.arange(len(owner)) - first[owner] + 1) / count[owner]
 
 
 def path_of_tip(tip: Tip, segments: np.ndarray) -> np.ndarray:

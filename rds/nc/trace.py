@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rds.interpolators.motion.segments import JOINTS, points_at
+from rds.interpolators.motion.segments import JOINTS, pieces, points_at
 from rds.nc.extent import extents
 from rds.nc.path_block import PathBlock
 
@@ -93,6 +93,5 @@ def sample(segments: np.ndarray, step: float = STEP) -> tuple[np.ndarray, np.nda
     """Points along segments after their starts (n × 3, X Y Z), and to which segment each belongs."""
     curved = segments["plane"] >= 0
     counts = np.where(curved, np.ceil(np.abs(segments["sweep"]) / step), 1).astype(int).clip(1)
-    owner = np.repeat(np.arange(len(segments)), counts)
-    share = (np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts) + 1) / counts[owner]
+    owner, share = pieces(counts)
     return points_at(segments[owner], share)[:, :3], owner

@@ -137,6 +137,13 @@ def points_at(segments: np.ndarray, share: np.ndarray) -> np.ndarray:
     return found
 
 
+def pieces(count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of each piece of segments cut into `count` (n,) equal ones: whose it is, and the share of the way to its end."""
+    owner = np.repeat(np.arange(len(count)), count)
+    first = np.cumsum(count) - count
+    return owner, (np.arange(len(owner)) - first[owner] + 1) / count[owner]
+
+
 def _turned(arm: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """What turning by `angle` adds to `arm` (n, 2), without cancellation."""
     lost = 2.0 * np.sin(angle / 2.0)[:, None] ** 2  # 1 − cos
