@@ -158,21 +158,21 @@ def _programmed_speed(block: SampleBlock) -> np.ndarray:
 
 def _path(result: Result, blocks: list[SampleBlock]) -> Picture:
     """The programmed path and the samples, in each plane of two linear axes in which they go somewhere."""
-    from rds.interpolators.motion.segments import AXES, LINE, point_at
+    from rds.interpolators.motion.segments import AXES, LINE, pieces, points_at
     from rds.interpolators.plots import in_planes
 
-    points, done = [], -1
+    points: list[np.ndarray] = []
+    done = -1
     for block in blocks:
-        for number, segment in enumerate(block.path, block.path_first):
-            if number <= done:
-                continue
-            done, length = number, float(segment["length"])
-            count = 1 if segment["plane"] == LINE else 2 + int(abs(float(segment["sweep"])) * _CHORDS)
-            points += [point_at(segment, length * k / count) for k in range(count + 1)]
+        fresh = block.path[max(0, done + 1 - block.path_first) :]
+        done = max(done, block.path_first + len(block.path) - 1)
+        curved = 2 + (np.abs(fresh["sweep"]) * _CHORDS).astype(int)
+        owner, share = pieces(np.where(fresh["plane"] == LINE, 1, curved))
+        points += [fresh["start"][:1], points_at(fresh[owner], share)]
     names = [axis for axis in result.meta["axes"] if axis in _LINEAR]
     columns = [AXES.index(name) for name in names]
     position = np.column_stack([result[f"{name}_reference"] for name in names])
-    programmed = np.array(points)[:, columns] if points else position[:1]
+    programmed = np.concatenate(points)[:, columns] if points else position[:1]
     going = [k for k in range(len(names)) if np.ptp(position[:, k]) > 0.0]
     return in_planes(names, going, programmed, position)
 

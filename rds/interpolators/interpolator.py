@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from math import dist
@@ -22,6 +22,7 @@ from rds.core.types import ArcSegment, Segment, Source
 from rds.interpolators import DEFAULT, LIBRARY
 from rds.interpolators.division import Method, check_steps
 from rds.interpolators.reference_word import Steps, steps
+from rds.interpolators.segment import checked
 
 Rows = Iterator[tuple[np.ndarray, ...]]
 _MOST = 2_000_000  # rows of a segment, which are held in memory
@@ -66,8 +67,10 @@ class Interpolator:
     def each(self, segment: Segment, T: float) -> Iterator[np.ndarray]:
         """Its theoretical rows one by one, as they are made: arrays of shape (3, axes).
 
-        Raises ContractError where a user's function breaks its interface; `rds check` names every fault.
+        Raises InputError for a segment or a period that can't be, ContractError where a user's function breaks its
+        interface; `rds check` names every fault.
         """
+        segment = checked(segment, T)
         expected = length(segment) / segment.feed_rate / T
         if not expected <= _MOST:
             said = f"a segment of {length(segment):g} mm at {segment.feed_rate:g} mm/s makes {expected:.3g} samples"
@@ -139,6 +142,14 @@ def as_interpolator(given: Any) -> Interpolator:
     if callable(given):
         return from_student(from_function(given))
     raise InputError(f"{shortened(given)} is no interpolator; give a name of the library, a .py file, or a function")
+
+
+def common_blu(used: Iterable[Interpolator]) -> float | None:
+    """The basic length unit (mm) in which positions along one path are whole; None without. InputError for two."""
+    sizes = sorted({each.blu for each in used if each.blu is not None})
+    if len(sizes) > 1:
+        raise InputError(f"lines and arcs have a BLU each, {sizes[0]:g} and {sizes[1]:g} mm; give both the same blu")
+    return sizes[0] if sizes else None
 
 
 def library_interpolator(name: str = DEFAULT, **options: Any) -> Interpolator:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.interpolators import DEFAULT
 from rds.interpolators.acceleration import Acceleration, smooth
 from rds.interpolators.deviation import path_distances
-from rds.interpolators.interpolator import Interpolator, as_interpolator
+from rds.interpolators.interpolator import Interpolator, as_interpolator, common_blu
 from rds.interpolators.reference_pulse import pulses
 from rds.interpolators.result import Interpolation
 from rds.interpolators.segment import checked
@@ -55,13 +55,14 @@ def interpolate(
     except TypeError as error:
         raise InputError(f"positions (mm), one for each axis, feed rates and T must be numbers: {error}") from None
     chosen = [pair[isinstance(segment, ArcSegment)] for segment in segments]
+    blu = common_blu(chosen)
+    _check_rests(rests or {}, len(segments))
     parts = [each.rows(segment, T) for each, segment in zip(chosen, segments, strict=True)]
     weights = acceleration.weights(T) if acceleration else np.ones(1)
     if not any(map(len, parts)):
         raise InputError("the path has no length: each of its segments ends where it starts; give another end")
     ends = range(len(parts)) if exact_stop and acceleration is not None else ()
     rows, first, last = _streams(parts, np.array(segments[0].start, dtype=float), weights, T, dict(rests or {}), ends)
-    blu = next((each.blu for each in chosen if each.blu is not None), None)
     theory = rows[:, 0]
     position = theory if blu is None else np.rint(theory / blu) * blu
     middles = path_distances(segments, (position[1:] + position[:-1]) / 2.0, first[1:], last[1:])
@@ -122,6 +123,15 @@ def _streams(
         stay(ceil(rests.get(end, 0.0) / T - 1e-9), end)
         begin = end + 1
     return np.concatenate(rows), np.concatenate(first), np.concatenate(last)
+
+
+def _check_rests(rests: Mapping[int, float], count: int) -> None:
+    """InputError for a rest after a segment that there is not, and for one that is no time."""
+    for after, seconds in rests.items():
+        if after not in range(-1, count):
+            raise InputError(f"rests: there is no segment {after!r} to rest after; -1 (before all) to {count - 1}")
+        if not 0.0 <= seconds < inf:
+            raise InputError(f"rests: after segment {after}, {seconds!r} must be a finite number of s from 0")
 
 
 def _of_tuples(segment: Segment) -> Segment:

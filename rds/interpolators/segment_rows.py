@@ -7,7 +7,6 @@ and `plane` ("XY"); `feed` where it is not that of the path. It is the form of a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from rds.core.types import ArcSegment, LineSegment, Segment
 
 FEED_UNITS = {"mm/min": 1 / 60, "mm/s": 1.0, "m/min": 1000 / 60, "in/min": 25.4 / 60, "in/s": 25.4}  # mm/s
 _MOST_AXES = 6
+_BEYOND = 1e300  # of a position; also what no float can be
 _POINT = Items(
     "one position for each axis, mm, of rotary axes degrees",
     Quantity("position", "mm"),
@@ -80,7 +80,7 @@ def point(value: Any, what: str, axes: int | None) -> tuple[float, ...]:
     """A position, mm per axis, from a list of numbers; InputError for anything else, or another number of axes."""
     said = f"{what} = {value!r:.60}"
     numbers = isinstance(value, list | tuple) and all(
-        isinstance(each, int | float) and not isinstance(each, bool) and isfinite(each) for each in value
+        isinstance(each, int | float) and not isinstance(each, bool) and abs(each) < _BEYOND for each in value
     )
     if not numbers or not 1 <= len(value) <= _MOST_AXES:
         raise InputError(f"{said} must be one to six positions: mm of X, Y, Z, degrees of A, B, C")

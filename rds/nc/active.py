@@ -91,7 +91,7 @@ class Follower(Interpreter):
         coolant = [word for word, on in (("M7", state.mist), ("M8", state.flood)) if on] or ["M9"]
         words = (
             "G80" if state.motion == NO_MOTION else f"G{state.motion / 10:g}",
-            _PLANES[(0, 1, 2)[state.plane]],
+            _PLANES[state.plane],
             "G90" if state.absolute else "G91",
             "G20" if state.inches else "G21",
             _FEED_MODES.get(state.feed_mode, "G94"),

@@ -30,7 +30,10 @@ Progress = Callable[[int, int], None]
 _MOST_NOTES, _LONGEST_NOTE = 5, 300  # of a program, characters: they stand in the last line of the compiled form
 _LARGEST_READ_TWICE = 4 << 20  # bytes; larger programs are made by machines, and their subroutines are called
 _LONGEST_NAME = 200  # bytes, of a subroutine that may have a file
-_CALLS = re.compile(rb"(?:o|gr)\s*(?:<\s*([^>\n]+?)\s*>|(\d+))", re.IGNORECASE)
+_BLANKS = b" \t\r"  # which say nothing, even within a name or a number
+_CALLS = re.compile(  # by O words, GR and M98 P: a name, a number, or what begins one that is worked out
+    rb"(?:o|gr|m[ \t\r0]*9[ \t\r]*8[^\n(;p]*p)[ \t\r]*(?:<([^>\n]+)>|(\d[\d \t\r]*)|([#\[]))", re.IGNORECASE
+)
 
 
 def motion(
@@ -183,7 +186,9 @@ def describe(program: Path, machine: Machine, setup: Setup) -> dict[str, Any]:
 
 
 def sources(program: Path) -> list[Path]:
-    """A program's file and the files beside it of subroutines that it may call (O<name> CALL is name.ngc)."""
+    """A program's file and the files beside it of subroutines that it may call: name.ngc for O<name> CALL, 100.ngc for
+    O100 CALL and M98 P100; all with a number for a name where that is worked out, as in O#1 CALL.
+    """
     found: dict[Path, None] = {}
     waiting = [program]
     while waiting:
@@ -202,11 +207,14 @@ def _called(path: Path) -> set[str]:
             if not stream.seek(0, 2):
                 return set()
             with mmap(stream.fileno(), 0, access=ACCESS_READ) as text:
-                names = {match[1] or match[2] for match in _CALLS.finditer(text)}
+                found = {match.groups() for match in _CALLS.finditer(text)}
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror}); check the path", str(path)) from error
-    given = {name.decode("utf-8", "replace") for name in names}
+    given = {name.translate(None, _BLANKS).decode("utf-8", "replace") for name, _, _ in found if name}
     wanted = given | {name.lower() for name in given}
+    wanted |= {(number.translate(None, _BLANKS).lstrip(b"0") or b"0").decode() for _, number, _ in found if number}
+    if any(worked_out for *_, worked_out in found):
+        wanted |= {beside.stem for beside in path.parent.glob("*.ngc") if re.fullmatch("-?[0-9]+", beside.stem)}
     return {name for name in wanted if "/" not in name and name.isprintable() and len(name.encode()) <= _LONGEST_NAME}
 
 

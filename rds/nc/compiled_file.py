@@ -27,6 +27,7 @@ _STORED = SEGMENT.newbyteorder("<")
 _LINES = np.dtype("<i4")
 _DIGEST = 65  # characters at the end
 _CHUNK = 1 << 20
+_LONGEST_LAST = 1 << 16  # bytes of the last line, which names the tools and has notes
 _AGAIN = "compile it again with `rds nc check`"
 
 
@@ -39,6 +40,8 @@ def beside(program: Path) -> Path:
 
 def is_ours(path: Path) -> bool:
     """Whether a file is a compiled program, of whatever format, and no data of someone else."""
+    if not path.is_file():
+        return False
     with path.open("rb") as stream:
         return stream.read(len(MAGIC) - 2) == MAGIC[:-2]
 
@@ -137,8 +140,8 @@ def _check(stream: BinaryIO, path: Path) -> None:
 
 def _last_line(stream: BinaryIO) -> bytes:
     end = stream.seek(0, 2) - _DIGEST
-    stream.seek(max(0, end - 4096))
-    data = stream.read(min(end, 4096))
+    stream.seek(max(0, end - _LONGEST_LAST))
+    data = stream.read(min(end, _LONGEST_LAST))
     return data[max(data.rfind(b'{"end":true'), 0) :]  # the records before it end with no line feed
 
 

@@ -47,7 +47,7 @@ def _lines(file: str, wanted: set[int]) -> dict[int, str]:
     if not file or not Path(file).is_file():
         return {}
     last, texts = max(wanted), {}
-    with open(file, encoding="utf-8-sig", errors="replace") as stream:
+    with open(file, encoding="utf-8-sig", errors="replace", newline="\n") as stream:
         for number, text in enumerate(stream, start=1):
             if number in wanted:
                 texts[number] = text

@@ -14,11 +14,12 @@ from typing import IO, Any
 from rds.nc.active import Follower, Modes
 from rds.nc.language.context import INCH
 from rds.nc.language.dialect import Dialect
+from rds.nc.language.errors import ProgramError
 from rds.nc.language.fast_lane import NEVER
-from rds.nc.language.parameters import COUNT
 from rds.nc.language.tools import Tool
 
 _SHOWN = 200  # characters of a line
+_LOOKED_AT = 5000  # numbered parameters: those above follow the machine
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,9 @@ def steps(
     try:
         for _ in stepper.run():
             yield from stepper.taken()
+    except ProgramError:
+        yield from stepper.taken()
+        raise
     finally:
         stepper.close()
     yield from stepper.taken()
@@ -75,7 +79,9 @@ class _Stepper(Follower):
         super().__init__(*given, **options)
         self.lane.wait = NEVER  # each line comes by itself
         self._steps: list[Step] = []
-        self._before: dict[str, float] = {}
+        self._numbers = self.context.parameters.numbers[:_LOOKED_AT]  # as the line before left them
+        self._globals: dict[str, float] = {}
+        self._locals: list[dict[str, float]] = []  # of each call within another, the program's first
 
     def taken(self) -> list[Step]:
         """The steps since the last call."""
@@ -96,9 +102,12 @@ class _Stepper(Follower):
     def _changed(self) -> dict[str, float]:
         """Parameters whose values are others than after the line before; not those that follow the position."""
         parameters = self.context.parameters
-        now = {f"#{k}": value for k, value in enumerate(parameters.numbers[:5000]) if value and k < COUNT}
-        for names in (parameters.globals, parameters.locals[-1]):
-            now |= {f"#<{name}>": value for name, value in names.items()}
-        changed = {name: value for name, value in now.items() if self._before.get(name) != value}
-        self._before = now
+        numbers, depth = parameters.numbers[:_LOOKED_AT], len(parameters.locals) - 1
+        pairs = enumerate(zip(numbers, self._numbers, strict=True))
+        changed = {f"#{k}": now for k, (now, before) in pairs if now != before}
+        own = self._locals[depth] if depth < len(self._locals) else {}
+        for names, known in ((parameters.globals, self._globals), (parameters.locals[-1], own)):
+            changed |= {f"#<{name}>": value for name, value in names.items() if known.get(name) != value}
+        self._numbers, self._globals = numbers, parameters.globals.copy()
+        self._locals[depth:] = [parameters.locals[-1].copy()]  # those of calls that have ended are forgotten
         return changed

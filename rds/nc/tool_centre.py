@@ -16,7 +16,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.interpolators.motion.planner import TOLERANCE
-from rds.interpolators.motion.segments import BLEND, JOINTS, LINE, MOVED, SEGMENT, TILTED, in_plane
+from rds.interpolators.motion.segments import BLEND, JOINTS, LINE, MOVED, SEGMENT, TILTED, pieces, points_at
 from rds.machines import Machine
 from rds.machines.kinematics.tip import Tip
 from rds.nc.language.frame import only_rotary
@@ -105,8 +105,10 @@ class ToolCentre:
         count = self._first_count(segments)
         share = self._share(segments, before, joints)
         for _ in range(_ROUNDS):
-            owner, u = _nodes(count)
-            made = self.bring(np.concatenate([_at(segments[:1], u[:1] * 0.0), _at(segments[owner], u)]), before, joints)
+            owner, u = pieces(count)
+            made = self.bring(
+                np.concatenate([points_at(segments[:1], u[:1] * 0.0), points_at(segments[owner], u)]), before, joints
+            )
             made[0] = before
             off = self._off(segments, owner, u, count, made, joints)
             worst = np.zeros(len(segments))
@@ -142,7 +144,7 @@ class ToolCentre:
         """How far the tip is from its path within each chord, mm."""
         off = np.zeros(len(owner))
         for share in _LOOKED_AT:
-            wanted = _at(segments[owner], u - (1.0 - share) / count[owner])
+            wanted = points_at(segments[owner], u - (1.0 - share) / count[owner])
             if joints:
                 wanted[:, :3] = self.meant.places(wanted, self.length)[0]
             place, _ = self.real.places(made[:-1] + share * (made[1:] - made[:-1]), self.length)
@@ -196,39 +198,6 @@ class ToolCentre:
         rows["tip"] = np.where(tilted, TILTED, MOVED)[owner]
         rows["tool_length"] = self.length
         return rows
-
-
-def _nodes(count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of the end of each chord: which move it is of, and the share of that move's way."""
-    owner = np.repeat(np.arange(len(count)), count)
-    first = np.cumsum(count) - count
-    return owner, (np.arange(len(owner)) - first[owner] + 1) / count[owner]
-
-
-def _at(segments: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Positions (n, 6) at the share u (n,) of the way of each segment; see `segments.point_at`."""
-    start, way = segments["start"], segments["end"] - segments["start"]
-    found: np.ndarray = start + u[:, None] * way
-    found[u == 1.0] = segments["end"][u == 1.0]
-    for plane in range(3):
-        some = np.flatnonzero((segments["plane"] == plane) & (u < 1.0))
-        if not len(some):
-            continue
-        first, second, _ = in_plane(plane)
-        arm = start[some][:, [first, second]] - segments["centre"][some][:, [first, second]]
-        whole = segments["sweep"][some]
-        off = way[some][:, [first, second]] - _turned(arm, whole)
-        turned = _turned(arm, u[some] * whole) + u[some, None] * off
-        found[some[:, None], [first, second]] = start[some][:, [first, second]] + turned
-    return found
-
-
-def _turned(arm: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """What turning by `angle` adds to `arm` (n, 2), without cancellation."""
-    lost = 2.0 * np.sin(angle / 2.0)[:, None] ** 2
-    across = np.column_stack((-arm[:, 1], arm[:, 0]))
-    made: np.ndarray = np.sin(angle)[:, None] * across - lost * arm
-    return made
 
 
 def path_of_tip(tip: Tip, segments: np.ndarray) -> np.ndarray:

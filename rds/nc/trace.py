@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rds.interpolators.motion.segments import JOINTS, in_plane
+from rds.interpolators.motion.segments import JOINTS, pieces, points_at
 from rds.nc.extent import extents
 from rds.nc.path_block import PathBlock
 
@@ -90,31 +90,8 @@ def _thinned(points: np.ndarray, resolution: float) -> np.ndarray:
 
 
 def sample(segments: np.ndarray, step: float = STEP) -> tuple[np.ndarray, np.ndarray]:
-    """Points along segments after their starts (n × 3, X Y Z), and to which segment each belongs.
-
-    On an arc the path is that of `rds.interpolators.motion.segments.point_at`.
-    """
+    """Points along segments after their starts (n × 3, X Y Z), and to which segment each belongs."""
     curved = segments["plane"] >= 0
     counts = np.where(curved, np.ceil(np.abs(segments["sweep"]) / step), 1).astype(int).clip(1)
-    owner = np.repeat(np.arange(len(segments)), counts)
-    share = (np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts) + 1) / counts[owner]
-    start, end = segments["start"][owner, :3], segments["end"][owner, :3]
-    points = start + (end - start) * share[:, None]
-    for plane in range(3):
-        of_plane = segments["plane"][owner] == plane
-        if of_plane.any():
-            first, second, _ = in_plane(plane)
-            arcs = segments[owner[of_plane]]
-            arm = arcs["start"][:, [first, second]] - arcs["centre"][:, [first, second]]
-            way = arcs["end"][:, [first, second]] - arcs["start"][:, [first, second]]
-            part = share[of_plane]
-            drift = way - _turned(arm, arcs["sweep"])
-            on_arc = arcs["start"][:, [first, second]] + _turned(arm, part * arcs["sweep"]) + part[:, None] * drift
-            points[of_plane, first], points[of_plane, second] = on_arc[:, 0], on_arc[:, 1]
-    return points, owner
-
-
-def _turned(arm: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """How far the tip of each arm moves when it turns by an angle."""
-    lost, sine = 2.0 * np.sin(angle / 2.0) ** 2, np.sin(angle)
-    return np.column_stack((-sine * arm[:, 1] - lost * arm[:, 0], sine * arm[:, 0] - lost * arm[:, 1]))
+    owner, share = pieces(counts)
+    return points_at(segments[owner], share)[:, :3], owner

@@ -15,6 +15,7 @@ from rds.interpolators.deviation import distances
 from rds.interpolators.interpolator import find_interpolator, library_interpolator
 from rds.interpolators.path import interpolate
 from rds.interpolators.plots import pictures
+from rds.interpolators.segment_rows import segments_of
 from rds.results import open_result
 
 T = 0.01
@@ -89,6 +90,34 @@ def test_pictures(method: str) -> None:
 def test_refusals(path: list, said: str) -> None:
     with pytest.raises(InputError, match=said):
         interpolate(path, T)
+
+
+@pytest.mark.parametrize(
+    ("rests", "said"),
+    [({3: 1.0}, "no segment 3 .*to 2"), ({-2: 1.0}, "no segment -2"), ({0: -1.0}, "from 0"), ({0: np.nan}, "finite")],
+)
+def test_rests_that_there_are_not(rests: dict[int, float], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        interpolate(KEYHOLE, T, rests=rests)
+
+
+def test_lines_and_arcs_have_one_basic_length_unit() -> None:
+    fine, coarse = (library_interpolator("reference-pulse", blu=blu) for blu in (0.002, 0.01))
+    with pytest.raises(InputError, match=r"a BLU each, 0\.002 and 0\.01 mm; give both the same"):
+        interpolate(KEYHOLE, T, lines=fine, arcs=coarse)
+    assert interpolate(KEYHOLE[:1], T, lines=fine, arcs=coarse).blu == 0.002
+
+
+@pytest.mark.parametrize("end", [[10**400, 0.0], [float("nan"), 0.0], [float("inf"), 0.0]])
+def test_a_row_whose_end_is_no_place_is_refused(end: list[float]) -> None:
+    with pytest.raises(InputError, match=r"segment 1: end = .* must be one to six positions"):
+        segments_of((0.0, 0.0), [{"kind": "line", "end": end}], 1.0, "mm/s")
+
+
+@pytest.mark.parametrize(("feed", "period"), [(0.0, T), (1.0, 0.0)])
+def test_rows_of_what_cannot_be_are_refused_as_a_path_is(feed: float, period: float) -> None:
+    with pytest.raises(InputError, match="above 0"):
+        library_interpolator().rows(LineSegment((0.0,), (1.0,), feed), period)
 
 
 def test_axes_are_named() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -20,6 +22,15 @@ def test_it_reaches_its_goal_within_its_limits(goal: float, speed: float, accele
         assert abs(v - before) <= 2 * acceleration * T * (1 + 1e-9)  # the last sample may end two at once
         assert min(0.0, goal) - 1e-9 <= x <= max(0.0, goal) + 1e-9
     assert (x, v) == (goal, 0.0)
+
+
+def test_a_slow_axis_that_gains_its_speed_at_once_does_not_leap_at_its_goal() -> None:
+    x, v, places = 0.0, 0.0, [0.0]
+    while x != 0.005:
+        x, v = advance(x, v, 0.005, 0.5, 5000.0, T)
+        places.append(x)
+    assert max(b - a for a, b in pairwise(places)) <= 0.5 * T * (1 + 1e-9)
+    assert len(places) == 6
 
 
 @given(v=st.floats(-15, 15), acceleration=st.floats(5, 500))

@@ -109,6 +109,12 @@ def test_a_file_of_someone_else_is_neither_overwritten_nor_removed(part: Path) -
     assert compiled_if_current(part, MACHINE, setup(part)) is None
 
 
+def test_a_folder_where_the_compiled_form_would_be_is_none(part: Path) -> None:
+    part.with_suffix(".dat").mkdir()
+    with pytest.raises(InputError, match=r"part\.dat.*rename or move it"):
+        check_program(part, MACHINE, setup(part))
+
+
 def test_a_program_may_not_bear_the_name_of_the_compiled_form(part: Path) -> None:
     program = part.rename(part.with_suffix(".DAT"))
     with pytest.raises(InputError, match=r"rename the program"):
@@ -140,3 +146,34 @@ def test_sources_are_the_files_that_may_be_called(tmp_path: Path) -> None:
     for name in ("b", "200", "3", "c"):
         (tmp_path / f"{name}.ngc").write_text("", encoding="utf-8")
     assert {path.name for path in sources(program)} == {"part.ngc", "a.ngc", "b.ngc", "200.ngc", "3.ngc"}
+
+
+@pytest.mark.parametrize(
+    "text, called",
+    [
+        ("M98 P1000", {"1000"}),
+        ("N10 m 098 L2 P 1 000 (twice)", {"1000"}),
+        ("O0200 CALL", {"200"}),
+        ("O< my  part > CALL", {"mypart"}),
+        ("O#1 CALL", {"200", "1000"}),  # whichever of the numbered ones
+        ("M98 P[#1 + 1]", {"200", "1000"}),
+        ("M3 (speed 1000) X8 Y9", set()),
+    ],
+)
+def test_sources_are_found_as_the_control_finds_them(tmp_path: Path, text: str, called: set[str]) -> None:
+    program = tmp_path / "part.ngc"
+    program.write_text(f"{text}\nM2\n", encoding="utf-8")
+    for name in ("200", "1000", "mypart", "8"):
+        (tmp_path / f"{name}.ngc").write_text("", encoding="utf-8")
+    found = {path.stem for path in sources(program)} - {"part"}
+    assert found == (called | {"8"} if len(called) > 1 else called)
+
+
+def test_the_last_line_may_name_all_tools_of_a_table(tmp_path: Path) -> None:
+    part, table = tmp_path / "part.ngc", tmp_path / "tools.tbl"
+    table.write_text("".join(f"T{99000 + k} P{k}\n" for k in range(1, 1001)), encoding="utf-8")
+    part.write_text("".join(f"T{99000 + k} M6\n" for k in range(1, 1001)) + "G0 X1\nM2\n", encoding="utf-8")
+    how = Setup(tools=table)
+    assert check_program(part, MACHINE, how)[0].ok
+    found = compiled_if_current(part, MACHINE, how)
+    assert found is not None and len(found.trailer["tools"]) == 1000

@@ -171,6 +171,16 @@ def test_a_spline_is_followed_within_its_error() -> None:
     assert cut["end"][-1][:2] == pytest.approx([40, 0])
 
 
+def test_a_spline_of_many_points_is_followed_within_its_error() -> None:
+    """Each span but those at the ends is the one before it, moved by 20 mm: what holds for one holds for all."""
+    points = np.array([(10.0 * k, 10.0 * (k % 2), 1.0) for k in range(150)])
+    places = curve(points, 4, CURVE_ERROR)
+    few = curve(points[:20], 4, CURVE_ERROR)
+    assert len(places) / 147 == pytest.approx(len(few) / 17, rel=0.1)
+    middle = places[len(places) // 2 :][:64]
+    assert np.hypot(*np.diff(middle, axis=0).T).max() < 0.5  # of a curve with radii of some 5 mm
+
+
 def test_a_nurbs_with_weights_is_a_circle() -> None:
     half = math.sqrt(0.5)
     places = curve(np.array([(1, 0, 1), (1, 1, half), (0, 1, 1.0)]), 3, 1e-6)

@@ -19,6 +19,7 @@ from rds.core.errors import InputError
 from rds.interpolators.motion.limiting import explained
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import plan
+from rds.interpolators.motion.segments import chain, line
 from rds.machines import load_machine
 from rds.machines.machine import Machine
 from rds.nc import ProgramError, steps
@@ -125,6 +126,20 @@ def test_steps_tell_the_words_in_force_after_each_line() -> None:
         list(steps("G21\nG12 X1\nM2\n"))
 
 
+def test_steps_tell_each_change_of_a_parameter_once() -> None:
+    text = "#1=5\n#1=0\n#<_g>=1\n#<a>=2\no1 sub\n#<_g>=3\no1 endsub\no1 call [4]\n#<a>=0\nM2\n"
+    found = [(step.line, dict(step.changed)) for step in steps(text, parameters={33: 2.0}) if step.changed]
+    assert found == [
+        *((1, {"#1": 5.0}), (2, {"#1": 0.0}), (3, {"#<_g>": 1.0}), (4, {"#<a>": 2.0})),
+        *((8, {"#1": 4.0}), (6, {"#<_g>": 3.0}), (7, {"#1": 0.0}), (9, {"#<a>": 0.0})),
+    ]
+    seen = []
+    with pytest.raises(ProgramError, match="G12"):
+        for step in steps("#1=1\n#2=2\nG12 X1\nM2\n"):
+            seen += [step.line]
+    assert seen == [1, 2]
+
+
 def test_what_holds_a_motion_back_adds_up_and_a_raised_limit_saves_a_second(tmp_path: Path) -> None:
     part = program(tmp_path, "G21 G90 G94\nG0 X60\nX-60\nX60\nX-60\nG1 X-50 F600\nM2\n")
     machine = load_machine("mini-cnc")
@@ -138,6 +153,16 @@ def test_what_holds_a_motion_back_adds_up_and_a_raised_limit_saves_a_second(tmp_
     raised[0] = rows[0]["to_save_a_second"]
     faster = sum(map(len, plan(blocks, replace(limits, velocity=raised), 0.001, start=np.zeros(6))))
     assert 1.0 <= (len(found.time) - faster) * 0.001 < 1.2
+
+
+def test_a_rotary_axis_alone_is_held_back_by_its_feed_or_its_limits() -> None:
+    limits = Limits.from_axes({"X": (50.0, 500.0, 5000.0), "A": (90.0, 900.0, 9000.0)})
+    there, back = line([0.0] * 6, [0.0] * 3 + [45.0, 0.0, 0.0], 30.0), line([0.0] * 3 + [45.0], [0.0], 1.0, rapid=True)
+    found = explained([PathBlock(chain(there, back))], limits, 0.01, 1)
+    assert found.limiting.seconds["programmed feed"] == pytest.approx(1.5, abs=0.1)
+    assert found.limiting.seconds["at rest"] < 0.05
+    assert {row["unit"] for row in found.rows if "unit" in row} <= {"degrees/s", "degrees/s²", "degrees/s³"}
+    assert any("degrees/s" in said for said in found.savings())
 
 
 def test_the_certificate_of_a_run_shows_what_holds_it_back(tmp_path: Path) -> None:

@@ -361,3 +361,9 @@ def test_what_stands_around_fanuc_s_blocks_and_in_them_changes_no_cut() -> None:
     called = f"O5 SUB\nZ-8\nO5 ENDSUB\n{head}{around}{tail}"
     for (kind, one), (other_kind, other) in zip(moves(plain), moves(called), strict=True):
         assert kind == other_kind and one[-1] == pytest.approx(other[-1], abs=1e-9)
+
+
+def test_cuts_within_one_another_may_be_a_thousand() -> None:
+    contour = "O100 SUB\nG0 X10\nG1 Z-5\nX8\nX20 Z-20\nO100 ENDSUB\n"
+    program = f"G21 G18 G90 G8 F100\n{contour}G0 X20 Z2\nG71 Q100 I0.009 R0.5\nM2\n"
+    assert sum(len(item) for item in interpret(program) if isinstance(item, MotionBlock)) > 4 * 1100

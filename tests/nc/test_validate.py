@@ -16,6 +16,7 @@ from rds.machines import load_machine
 from rds.nc.check import check_program
 from rds.nc.extent import extents
 from rds.nc.fault_columns import find_word
+from rds.nc.run.report import _program_lines
 from rds.nc.setup import Setup
 from rds.nc.trace import MOST_POINTS, Trace, sample
 from rds.nc.validate import MOST_FAULTS, tool_limits
@@ -237,6 +238,14 @@ def test_limits_of_a_tool_stand_in_its_comment(comment: str, speed: float, feed:
 )
 def test_words_are_found_on_their_lines(text: str, letters: str, found: tuple[int, str]) -> None:
     assert find_word(text, letters) == found
+
+
+def test_lines_are_counted_as_the_interpreter_counts_them(tmp_path: Path) -> None:
+    part = tmp_path / "part.ngc"
+    part.write_bytes(b"\xef\xbb\xbfG21 G90\r\r\nG1 X1 F100\r\r\n(\x0c)  X500\r\r\nM2\r\r\n")
+    result, _ = check_program(part, load_machine("mini-cnc"), Setup())
+    assert [(fault.line, fault.column, fault.word) for fault in result.faults] == [(3, 6, "X500")]
+    assert [line.strip() for line in _program_lines(part)] == ["G21 G90", "G1 X1 F100", "(\x0c)  X500", "M2", ""]
 
 
 def test_numbers_read_well() -> None:

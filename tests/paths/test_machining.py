@@ -12,11 +12,13 @@ from typer.testing import CliRunner
 
 from rds.cli.main import app
 from rds.core.errors import InputError
+from rds.interpolators.motion.segments import chain, line
 from rds.machines import load_machine
 from rds.nc.check import motion
 from rds.nc.language.tool_library import ShapedTool, read_library
 from rds.nc.machining.area import area_of, pocket_rings
 from rds.nc.machining.job import read_job
+from rds.nc.path_block import PathBlock
 from rds.nc.paths.region import mended
 from rds.nc.setup import Setup
 from rds.nc.shapes.centre_lines import centre_lines
@@ -100,6 +102,11 @@ def carved(folder: Path, name: str = "job.toml", cell: float = 0.1) -> tuple[Car
     carving = Carving(stock, {tool.number: tool for tool in read_library(library)})
     carving.program(motion(folder / "part.ngc", load_machine("mini-cnc"), Setup(tools=library)))
     return carving, stock
+
+
+def test_an_svg_takes_no_unit(folder: Path) -> None:
+    with pytest.raises(InputError, match=r"plate\.svg.*says its own size; leave the unit out"):
+        read_vector_drawing(str(folder / "plate.svg"), "in")
 
 
 def test_an_svg_is_read_in_mm_upwards_with_its_layers_and_transforms(folder: Path) -> None:
@@ -265,6 +272,12 @@ def test_what_a_photograph_leaves_never_hangs_together_at_a_corner(seed: int) ->
         (('layer = "holes"', 'layer = "hole"'), "did you mean 'holes'"),
         (("depth = 2", "depth = 2\nstep_over = 0.9"), "at most 0.5"),
         (('tools = "tools.toml"', 'tools = "tools.toml"\nsafe = 0'), "below the clearance"),
+        (('drawing = "plate.svg"\n', ""), "is of a drawing, and there is none"),
+        (('drawing = "plate.svg"\n', 'unit = "in"\ntext = { text = "A" }\n'), "is of a drawing in a file"),
+        (("peck = 1", "peck = 1\nat = [1.0, 2.0]"), "leave at out, or layer"),
+        (("peck = 1", "peck = 1\ndwell = 0.5"), "does not dwell"),
+        (('layer = "holes"\n', "grid = [-2, -1, 1.0, 1.0]\n"), "two whole numbers of holes, from 1"),
+        (("tabs = 3", 'side = "on"\nstock_to_leave = 0.1'), "nothing is left beside"),
     ],
 )
 def test_faults_of_a_job_name_their_place(folder: Path, change: tuple[str, str], said: str) -> None:
@@ -291,3 +304,55 @@ def test_the_commands_list_layers_make_and_cut(folder: Path) -> None:
     assert (folder / "part-cut.png").exists()
     again = run.invoke(app, [*words, "--part", str(folder / "cut.npz")])
     assert json.loads(again.stdout)["part"]["highest_mm"] == 0.0
+
+
+@pytest.mark.parametrize("depth, step_down", [(3.0, 1.0), (4.0, 0.8), (2.0, 2.0), (5.0, 0.5)])
+def test_tabs_have_their_width_wherever_the_ramps_ended(tmp_path: Path, depth: float, step_down: float) -> None:
+    (tmp_path / "tools.toml").write_text(TOOLS)
+    (tmp_path / "plate.svg").write_text(SVG)
+    (tmp_path / "job.toml").write_text(
+        'drawing = "plate.svg"\ntools = "tools.toml"\n[[operation]]\ndo = "contour"\nlayer = "outline"\ntool = 1\n'
+        f"depth = {depth}\nstep_down = {step_down}\ntabs = 7\ntab_width = 3.0\ntab_height = 1.3\n"
+    )
+    (piece,) = read_job(tmp_path / "job.toml").cuts[0].pieces
+    roof = 1.3 - depth
+    passes = len({round(segment.end[2], 9) for segment in piece if segment.end[2] < roof})
+    over = [segment for segment in piece if abs(segment.start[2] - roof) + abs(segment.end[2] - roof) < 1e-9]
+    length = sum(float(np.hypot(*np.subtract(segment.end[:2], segment.start[:2]))) for segment in over)
+    assert length == pytest.approx(7 * passes * 6.0, rel=1e-3)  # of each tab with the tool, in each pass
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 and nothing more", b"heights"])
+def test_a_file_that_no_cut_has_saved_is_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "part.npz").write_bytes(content)
+    with pytest.raises(InputError, match=r"part\.npz.*holds no heights that a cut has saved"):
+        Stock.block((0, 0, 0), (1, 1, 1), 0.5).part(tmp_path / "part.npz")
+
+
+def test_the_line_in_which_a_rotary_axis_turns_is_named() -> None:
+    rows = chain(line([0.0] * 3, [5.0], 1.0, program_line=3), line([5.0], [5.0, 0, 0, 90.0], 1.0, program_line=8))
+    carving = Carving(Stock.block((0, 0, -1), (1, 1, 0), 0.5), {1: ShapedTool(1, 3.0)})
+    with pytest.raises(InputError, match="line 8: rotary axes move"):
+        carving.program([PathBlock(rows, tool=1)])
+    rows["end"], rows["rapid"] = [[5.0, 0, 0, 0, 0, 0]] * 2, [True, False]
+    with pytest.raises(InputError, match="line 8: cuts with tool 2"):
+        carving.program([PathBlock(rows, tool=2)])
+
+
+def test_a_fault_is_told_once_for_a_line_with_its_largest_value() -> None:
+    carving = Carving(Stock.block((0, 0, -1), (1, 1, 0), 0.5), {})
+    for line_number, kind, value in ((3, "rapid", 1.0), (3, "table", 2.0), (3, "rapid", 4.0), (3, "rapid", 2.0)):
+        carving._fault(line_number, kind, value)
+    assert [(fault.line, fault.kind, fault.value) for fault in carving.faults] == [(3, "rapid", 4.0), (3, "table", 2.0)]
+
+
+def test_holes_are_written_to_the_last_decimal(tmp_path: Path) -> None:
+    (tmp_path / "tools.toml").write_text(TOOLS)
+    (tmp_path / "job.toml").write_text(
+        'tools = "tools.toml"\nsafe = 1234.5678\nblend = 0.00002\n[[operation]]\ndo = "drill"\ntool = 2\n'
+        "depth = 2.34567\ndwell = 0.00005\nplunge = 1234567.0\nspindle = 1234567.0\n"
+        "at = [123.4567, -1000.1234]\ngrid = [1, 2, 0.0, 0.0001]\n"
+    )
+    text = read_job(tmp_path / "job.toml").program()
+    assert "G99 G82 P0.00005 X123.4567 Y-1000.1234 Z-2.3457 R0.5 F1234567\nX123.4567 Y-1000.1233\n" in text
+    assert "G64 P0.00002\n" in text and "S1234567 M3\nG0 Z1234.5678\n" in text

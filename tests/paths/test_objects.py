@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, cos, hypot, pi, radians, sin
+from math import ceil, cos, hypot, nextafter, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -61,6 +61,15 @@ def test_an_arc_goes_through_the_points_of_the_source(turned: int) -> None:
     assert np.allclose(cut.start, points[0]) and np.allclose(cut.end, points[-1])
     assert np.allclose(np.hypot(points[:, 0] - 3, points[:, 1] + 4), 7)
     assert np.degrees(sweep(cut)) == pytest.approx(turned)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("start", [0.0, 30.0, 267.7655405799703, 351.3])
+@pytest.mark.parametrize("swept", [360.0, nextafter(360.0, 361.0), nextafter(360.0, 0.0), -nextafter(720.0, 721.0)])
+def test_a_circle_whose_sweep_is_rounded_is_one_circle(start: float, swept: float) -> None:
+    segments = arc((3.25, -7.5), 12.3, start, swept, 5.0)
+    assert total_length(segments) == pytest.approx(abs(swept) * pi / 180 * 12.3, rel=1e-9)
+    assert len(segments) == round(abs(swept) / 360) and segments[-1].end == segments[0].start
+    assert total_length(arc((0, 0), 5.0, start, 1e-7, 5.0)) == pytest.approx(1e-7 * pi / 180 * 5, rel=1e-3)
 
 
 @given(st.floats(0.01, 500), st.floats(-720, 720), st.floats(-1500, 1500), st.floats(-10, 10), st.floats(-10, 10))

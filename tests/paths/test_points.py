@@ -45,6 +45,7 @@ def read(file: Path, text: str | bytes, unit: str | None = None):
         "# unit = mm\n1 2 3\n# between\n4, 5, 6\n\n\n",
         "z [cm], x [cm], y [cm]\n0.3, .1, 2e-1\n0.6, 0.4, +0.5\n",
         '"x [um]","y [um]","z [um]"\n1000,2000,3000\n4000,5000,6000\n',
+        "x [\N{MICRO SIGN}m] y [\N{GREEK SMALL LETTER MU}m] z\n1000 2000 3000\n4000 5000 6000\n",
         "# units: in\n0.03937007874015748,0.07874015748031496,0.11811023622047244\n"
         "0.15748031496062992,0.19685039370078740,0.23622047244094488\n",
     ],

@@ -26,6 +26,7 @@ from rds.nc.run.judge import located
 from rds.nc.run.methods import compare_methods
 from rds.nc.run.path import as_prepared
 from rds.nc.run.path_method import Method, program_of
+from rds.nc.run.path_segments import in_room
 from rds.nc.run.pictures import along, path
 from rds.nc.run.report import findings
 from rds.nc.run.run import PartProgram
@@ -253,6 +254,13 @@ def test_a_part_program_is_a_reference_too(here: Path) -> None:
     )
     result = experiment.run(changes=[(1.0, "resume", 1.0)])
     assert result["X_reference"][-1] == 6.0 and "the spindle stands" in " ".join(result.meta["notes"])
+
+
+@pytest.mark.parametrize("turned", [0.5, 2.8, 44.0])
+def test_the_extremes_of_an_arc_stay_within_the_travel(turned: float) -> None:
+    begin = tuple((75.01 * np.array([np.cos(np.radians(turned)), np.sin(np.radians(turned))])).tolist())
+    with pytest.raises(InputError, match=r"segment 7 takes X from -75\.01 to 75\.01 mm"):
+        in_room([ArcSegment(begin, begin, (0.0, 0.0), 5.0)], [7], load_machine("mini-cnc"), ["X", "Y"])
 
 
 def test_a_fault_is_told_with_the_line_and_the_time(here: Path) -> None:

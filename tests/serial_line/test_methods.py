@@ -280,6 +280,10 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
     machine = load_machine("starmill")
     with pytest.raises(InputError, match="motion 'fast' is unknown; known: plan, constant"):
         serial_motion(file, machine, motion="fast")
+    still = tmp_path / "still.ngc"
+    still.write_text("G21 G90\nG4 P0.1\nM2\n")
+    with pytest.raises(InputError, match=r"still\.ngc.*nothing in it moves"):
+        serial_motion(still, machine)
     made = serial_motion(file, machine)
     with pytest.raises(InputError, match="method 'D' is unknown; known: A, B, C, C-thesis"):
         run_method("D", made, machine)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
-from math import ceil, pi
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import MARGIN
 from rds.interpolators.motion.resting import Resting
 from rds.interpolators.motion.samples import SampleBlock
-from rds.interpolators.motion.segments import BLEND, LINE, point_at
+from rds.interpolators.motion.segments import BLEND, LINE, pieces, points_at
 
 CHORD = pi / 18.0  # rad, of an arc
 
@@ -50,20 +50,18 @@ def _one(part: np.ndarray, first: int, before: float, limits: Limits, T: float, 
     points: list[np.ndarray] = [part[0]["start"]]
     at: list[tuple[int, float, float]] = []  # of each move: its segment, programmed way to its start and to its end
     feeds: list[float] = []
-    way = before
-    for k, segment in enumerate(part):
-        length = float(segment["length"])
-        count = 1 if segment["plane"] == LINE else max(1, ceil(abs(float(segment["sweep"])) / CHORD - 1e-9))
-        for j in range(count if length > 0.0 else 0):
-            point = segment["end"] if j + 1 == count else point_at(segment, length * (j + 1) / count)
-            move = point - points[-1]
-            size = float(np.linalg.norm(move))
-            if size < SAME:
-                continue
-            points.append(point)
-            at.append((k, way + length * j / count, way + length * (j + 1) / count))
-            feeds.append(_feed(segment, move, size, length / count, limits))
-        way += length
+    chords = np.where(part["plane"] == LINE, 1, np.ceil(np.abs(part["sweep"]) / CHORD - 1e-9).clip(1)).astype(int)
+    owner, share = pieces(np.where(part["length"] > 0.0, chords, 0))
+    length = part["length"][owner] / chords[owner]
+    way = before + (np.cumsum(part["length"]) - part["length"])[owner] + share * part["length"][owner]
+    for k, point, piece, to in zip(owner, points_at(part[owner], share), length, way, strict=True):
+        move = point - points[-1]
+        size = float(np.linalg.norm(move))
+        if size < SAME:
+            continue
+        points.append(point)
+        at.append((k, to - piece, to))
+        feeds.append(_feed(part[k], move, size, piece, limits))
     if not at:
         return
     motion = blended(np.array(points), feeds, T)

@@ -20,7 +20,7 @@ def advance(
     else:
         left = goal - position
         samples = sqrt(0.25 + 2.0 * abs(left) / (most * T)) - 0.5
-        if samples <= 1.0 and abs(velocity) <= 2.0 * most:
+        if samples <= 1.0 and abs(velocity) <= 2.0 * most and abs(left) <= speed * T:
             return goal, 0.0
         wanted = copysign(min(speed, most * samples), left)
     velocity = min(max(wanted, velocity - most), velocity + most)

@@ -12,16 +12,17 @@ from rds.interpolators.motion.least_time import LeastTime
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.pieces import BEND, DISTANCE, RATIO, SLOPE, TWIST
 from rds.interpolators.motion.planner import plan
-from rds.interpolators.motion.segments import AXES
+from rds.interpolators.motion.segments import AXES, LINE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 KINDS = ("velocity", "acceleration", "jerk")
-UNITS = ("mm/s", "mm/s²", "mm/s³")
+PER = ("/s", "/s²", "/s³")
 FEED, PATH, REST = "programmed feed", "corners and ends ahead", "at rest"
 NEAR = 0.95  # of a limit: it holds the motion back
 EVEN = 0.75  # of the even speed that a bend allows: it does so too; the planner keeps some of the jerk for ramps
+NO_WAY = 2e-9  # mm in X, Y and Z: of a move of rotary axes
 TINY = 1e-9  # of a derivative of the path: what is less asks nothing of an axis
 SAVED = 1.0  # s
 ASKED = 3  # limits
@@ -33,7 +34,8 @@ _ROUNDS = 10
 class Limiting:
     """Of each planned sample: time (s), way along the programmed path (mm), programmed and planned speed (mm/s; nan
     and the planned one in rapids), the highest even speed at which the axes can go along its piece of the path (mm/s),
-    its line, and what holds it back (index into `causes`). least_time: of the whole, without a limit of the jerk, s.
+    its line, and what holds it back (index into `causes`). Where rotary axes move alone, way and speeds are in degrees.
+    least_time: of the whole, without a limit of the jerk, s.
     """
 
     time: np.ndarray
@@ -123,7 +125,9 @@ def limiting(blocks: Sequence[Any], limits: Limits, T: float) -> Limiting:
             shares.append(values[:, i] / limit[i])
             names.append(f"{kind} of {AXES[i]}")
     table = np.column_stack(shares)
-    planned = np.linalg.norm(velocity[:, :3], axis=1)
+    linear, rotary = (np.linalg.norm(velocity[:, some], axis=1) for some in (slice(3), slice(3, 6)))
+    turns = np.linalg.norm(path["end"][:, :3] - path["start"][:, :3], axis=1) <= NO_WAY
+    planned = np.where((turns & (path["plane"] == LINE))[segment], rotary, linear)
     rate = np.where(path["rapid"], np.nan, path["rate"])[segment]
     way = np.concatenate([block.distance for block in samples])
     allowed, by = pieces.at(way)
@@ -132,7 +136,7 @@ def limiting(blocks: Sequence[Any], limits: Limits, T: float) -> Limiting:
     bend = 3 + by // 6 * int(limits.present.sum()) + axes[by % 6]
     cause = np.where(table.max(axis=1) >= NEAR, 3 + table.argmax(axis=1), np.where(planned >= EVEN * allowed, bend, 1))
     cause = np.where(planned >= 0.98 * np.nan_to_num(rate, nan=np.inf), 0, cause)
-    cause = np.where(planned == 0.0, 2, cause)
+    cause = np.where((velocity == 0.0).all(axis=1), 2, cause)
     return Limiting(
         time=np.arange(len(position)) * T,
         way=way,
@@ -214,7 +218,7 @@ def explained(blocks: Sequence[Any], limits: Limits, T: float, looked_for: int =
             row |= {
                 "limit": now,
                 "to_save_a_second": None if times is None else times * now,
-                "unit": UNITS[KINDS.index(kind)],
+                "unit": ("mm" if axis in AXES[:3] else "degrees") + PER[KINDS.index(kind)],
             }
         rows.append(row)
     return Explained(found, rows)

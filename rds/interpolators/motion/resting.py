@@ -40,7 +40,9 @@ class Resting:
 
     def stretches(self, block: Any, most: int | None = None) -> Iterator[tuple[int, np.ndarray]]:
         """Runs of segments without an event between them, at most `most` long, and the number of their first."""
-        path, events = getattr(block, "segments", block), list(getattr(block, "events", ()))
+        path, due = getattr(block, "segments", block), dict[int, list[Any]]()  # what happens after which segment
+        for event in getattr(block, "events", ()):
+            due.setdefault(event.after, []).append(event)
         if len(path):
             check_segments(path, self._limits.present, self._end)
             self._end = path["end"][-1].copy()
@@ -52,22 +54,21 @@ class Resting:
             self._number = self._first
         if self._point is None and len(path):
             self._point = path["start"][0].copy()
-        if self._out.total == 0 and (len(path) or events):
+        if self._out.total == 0 and (len(path) or due):
             self._line = int(path["line"][0]) if len(path) else 0
             self._stay(1)
-        self._happen(events, -1)
+        self._happen(due.get(-1, ()))
         k = 0
         while k < len(path):
             upto = k + 1
             limit = len(path) if most is None else min(k + most, len(path))
-            met = {event.after for event in events}
-            while upto < limit and upto - 1 not in met:
+            while upto < limit and upto - 1 not in due:
                 upto += 1
             if path["length"][k:upto].any():
                 yield self._first + k, path[k:upto]
             self._before += float(path["length"][k:upto].sum())
             self._line, self._number = int(path["line"][upto - 1]), self._first + upto - 1
-            self._happen(events, upto - 1)
+            self._happen(due.get(upto - 1, ()))
             k = upto
 
     def move(
@@ -97,10 +98,8 @@ class Resting:
         self._hand_on()
         yield from self.ready()
 
-    def _happen(self, events: Iterable[Any], after: int) -> None:
+    def _happen(self, events: Iterable[Any]) -> None:
         for event in events:
-            if event.after != after:
-                continue
             self._out.events.append((self._out.total - 1, event))
             rows = ceil(event.value / self._T - 1e-9) if event.kind == "dwell" else 0
             while rows > 0:

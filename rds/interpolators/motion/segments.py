@@ -110,27 +110,46 @@ def length_of_line(start: np.ndarray, end: np.ndarray) -> float:
 
 
 def point_at(segment: np.ndarray, distance: float) -> np.ndarray:
-    """Where the programmed path is, `distance` mm (degrees) after the start of `segment` (one row): 6 positions.
+    """Where the programmed path is, `distance` mm (degrees) after the start of `segment` (one row): 6 positions."""
+    share = distance / segment["length"] if segment["length"] > 0.0 else 1.0
+    return points_at(np.array([segment], SEGMENT), np.array([share]))[0]
+
+
+def points_at(segments: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Positions (n, 6) of the programmed path at the share (n,) of the way of each of n segments.
 
     On an arc whose end is a little off its circle the radius stays and the difference is spread along it, so that
     the path ends on the programmed end.
     """
-    share = distance / segment["length"] if segment["length"] > 0.0 else 1.0
-    start, end = segment["start"], segment["end"]
-    point = start + (end - start) * share
-    if segment["plane"] == LINE:
-        return point
-    first, second, _ = in_plane(int(segment["plane"]))
-    centre = segment["centre"]
-    arm = np.array([start[first] - centre[first], start[second] - centre[second]])
+    start, way = segments["start"], segments["end"] - segments["start"]
+    found: np.ndarray = start + share[:, None] * way
+    for plane in (XY, ZX, YZ):
+        some = np.flatnonzero(segments["plane"] == plane)
+        if not len(some):
+            continue
+        first, second, _ = in_plane(plane)
+        arm = start[some][:, [first, second]] - segments["centre"][some][:, [first, second]]
+        whole = segments["sweep"][some]
+        off = way[some][:, [first, second]] - _turned(arm, whole)
+        turned = _turned(arm, share[some] * whole) + share[some, None] * off
+        found[some[:, None], [first, second]] = start[some][:, [first, second]] + turned
+    found[share == 1.0] = segments["end"][share == 1.0]
+    return found
 
-    def turned(angle: float) -> np.ndarray:  # from the start, about the centre
-        lost = 2.0 * np.sin(angle / 2.0) ** 2  # 1 − cos, without cancellation
-        return np.sin(angle) * np.array([-arm[1], arm[0]]) - lost * arm
 
-    off = np.array([end[first] - start[first], end[second] - start[second]]) - turned(float(segment["sweep"]))
-    point[[first, second]] = start[[first, second]] + turned(float(share * segment["sweep"])) + share * off
-    return point
+def pieces(count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of each piece of segments cut into `count` (n,) equal ones: whose it is, and the share of the way to its end."""
+    owner = np.repeat(np.arange(len(count)), count)
+    first = np.cumsum(count) - count
+    return owner, (np.arange(len(owner)) - first[owner] + 1) / count[owner]
+
+
+def _turned(arm: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """What turning by `angle` adds to `arm` (n, 2), without cancellation."""
+    lost = 2.0 * np.sin(angle / 2.0)[:, None] ** 2  # 1 − cos
+    across = np.column_stack((-arm[:, 1], arm[:, 0]))
+    made: np.ndarray = np.sin(angle)[:, None] * across - lost * arm
+    return made
 
 
 def chain(*segments: np.ndarray) -> np.ndarray:

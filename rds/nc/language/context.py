@@ -51,7 +51,7 @@ class Context:
 
     def from_machine(self, length: float) -> float:
         """A length in the machine's units in the program's."""
-        mm = length / INCHES_PER_MM if self.dialect.inch_machine else length / 1.0
+        mm = length / INCHES_PER_MM if self.dialect.inch_machine else length
         return mm / INCH if self.state.inches else mm
 
     def to_machine(self, length: float) -> float:

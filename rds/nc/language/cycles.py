@@ -20,6 +20,7 @@ from rds.nc.language.state import INVERSE_TIME, PER_MINUTE
 CLEARANCE = 0.010  # inch: how far above the last depth a peck begins again (LinuxCNC's G83_RAPID_DELTA)
 _DWELLING = frozenset((820, 860, 880, 890))  # P is wanted when the cycle begins
 _PECKING = frozenset((730, 830))
+_MOST = 100_000  # holes, and pecks of all of them, by one line
 
 
 class _Hole(NamedTuple):
@@ -72,6 +73,11 @@ def cycle(m: Context, block: Block) -> None:
     if mode != "EXACT_PATH":
         m.out.call("SET_MOTION_CONTROL_MODE", "EXACT_PATH")
     _settle_words(m, words, code, began, key)
+    pecks = (retract - bottom) / state.cycle_peck if code in _PECKING else 1.0
+    if repeats > _MOST:
+        raise Fault(f"more than {_MOST:,} holes by one line; write a smaller L", "l")
+    if repeats * pecks > _MOST:
+        raise Fault(f"more than {_MOST:,} pecks by one line; write a larger Q", "q" if "q" in words else key)
     for repeat in range(repeats):
         at = _next(at, by, key)
         hole = _Hole(*at, retract, clear, bottom)

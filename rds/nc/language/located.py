@@ -44,7 +44,7 @@ def located(
     if fault.key:
         at = place_in(fault.key, text, places)
         if at < 0 and fault.key == f"g{motion}":  # of a motion that an earlier line has set
-            message = f"G{motion // 10} is still in force: {message}"
+            message = f"G{motion / 10:g} is still in force: {message}"
             at = min((place for axis in AXES if (place := place_in(axis, text, places)) >= 0), default=-1)
     column = 0
     if at == -2:

@@ -9,6 +9,8 @@ from rds.nc.language.canon import FEED, TRAVERSE
 from rds.nc.language.context import Context
 from rds.nc.language.expressions import Fault
 
+_MOST = 10_000  # passes of a thread
+
 
 def threading(m: Context, block: Block, end: list[float]) -> None:
     """G76 P (pitch) Z I (from the drive line to the thread's crest) J (first cut) K (whole depth) and, where given,
@@ -61,6 +63,10 @@ class _Thread:
         ends = int(words.get("l", 0.0))
         self._enters, self._leaves = bool(taper and ends & 1), bool(taper and ends & 2)
         self._target = end[2] + self._depth * self._slope
+        if self._degression * math.log(self._depth / self._first) > math.log(_MOST):
+            raise Fault(f"more than {_MOST:,} cuts; write a larger first cut J, or a smaller R", "j")
+        if self._springs > _MOST:
+            raise Fault(f"more than {_MOST:,} spring passes; write a smaller H", "h")
 
     def cut(self) -> None:
         depth, number = self._crest + self._first, 1

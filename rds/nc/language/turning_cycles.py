@@ -244,8 +244,13 @@ def _open_at(points: list[Point], height: float) -> list[_Layer]:
 def _pockets(layers: list[_Layer]) -> list[_Layer]:
     """The uppermost layers that are not open towards the start."""
     found: list[_Layer] = []
-    for layer in layers:
-        found += _pockets(layer.below) if layer.outer else [layer]
+    waiting = layers[::-1]
+    while waiting:
+        layer = waiting.pop()
+        if layer.outer:
+            waiting += layer.below[::-1]
+        else:
+            found.append(layer)
     return found
 
 
@@ -253,22 +258,23 @@ def _cut(
     tool: _Tool, layer: _Layer, points: list[Point], u_start: float, top: float, depth: float, back: float
 ) -> None:
     """A layer and all below it; the tool is in the layer above it, or above the start."""
-    clear = min(layer.v + depth, top)  # what lies between this layer and the one above has been cut down to here
-    if layer.outer:
+    waiting = [layer]
+    while waiting:
+        layer = waiting.pop()
+        clear = min(layer.v + depth, top)  # what lies between this layer and the one above has been cut down to here
         tool.rapid(tool.at[0], max(clear, tool.at[1]))
-        tool.rapid(u_start, tool.at[1])
-        tool.rapid(u_start, layer.v)
-    else:
-        flank = _flank(points, layer, clear)
-        tool.rapid(tool.at[0], max(clear, tool.at[1]))
-        tool.rapid(flank[0][0], tool.at[1])
-        tool.cut(*flank[0])
-        tool.along(flank[1:])
-    tool.cut(layer.end, layer.v)
-    out = min(back, (layer.end - layer.begin) / 2.0)
-    tool.rapid(layer.end - out, layer.v + out)
-    for lower in layer.below:
-        _cut(tool, lower, points, u_start, top, depth, back)
+        if layer.outer:
+            tool.rapid(u_start, tool.at[1])
+            tool.rapid(u_start, layer.v)
+        else:
+            flank = _flank(points, layer, clear)
+            tool.rapid(flank[0][0], tool.at[1])
+            tool.cut(*flank[0])
+            tool.along(flank[1:])
+        tool.cut(layer.end, layer.v)
+        out = min(back, (layer.end - layer.begin) / 2.0)
+        tool.rapid(layer.end - out, layer.v + out)
+        waiting += layer.below[::-1]
 
 
 def _flank(points: list[Point], layer: _Layer, clear: float) -> list[Point]:

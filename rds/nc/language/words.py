@@ -40,10 +40,11 @@ def tidy(raw: bytes) -> str:
 
 def columns(raw: bytes) -> list[int]:
     """Of each character of tidy(raw), which character of the line it is (from 1)."""
-    found = []
+    found: list[int] = []
+    base = 0
     for index, part in enumerate(_COMMENT.split(raw.rstrip())):
-        base = len(b"".join(_COMMENT.split(raw.rstrip())[:index]))
         found += [base + at + 1 for at, byte in enumerate(part) if index % 2 or byte not in _BLANKS]
+        base += len(part)
     return found
 
 

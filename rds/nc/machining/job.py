@@ -16,7 +16,7 @@ from rds.core.types import Segment
 from rds.nc.language.tool_library import read_library
 from rds.nc.machining.operations import OPERATIONS, Cut, operate
 from rds.nc.paths.numbers import BLEND, HEIGHT
-from rds.nc.paths.program import MoveWriter, comment
+from rds.nc.paths.program import MoveWriter, comment, written
 from rds.nc.shapes.curves import Curve, Drawing
 from rds.nc.shapes.files import read_vector_drawing
 from rds.nc.shapes.lettering import text_drawing
@@ -75,8 +75,9 @@ class Job:
             yield comment(text)
         yield "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
         if self.blend is not None:
-            yield f"G64 P{self.blend:g}"
+            yield f"G64 P{written(self.blend, 6)}"
         tool = spindle = None
+        safe = written(self.safe, decimals)
         writer = MoveWriter(decimals)
         for number, cut in enumerate(self.cuts, start=1):
             yield comment(f"operation {number}: {cut.title}")
@@ -87,15 +88,15 @@ class Job:
                 yield "G43"
                 tool, spindle, writer = cut.tool.number, None, MoveWriter(decimals)
             if cut.spindle is not None and cut.spindle != spindle:
-                yield f"S{cut.spindle:g} M3"
+                yield f"S{written(cut.spindle, 3)} M3"
                 spindle = cut.spindle
-            yield f"G0 Z{self.safe:g}"
+            yield f"G0 Z{safe}"
             if cut.holes is not None:
                 yield from self._holes(cut, decimals)
                 writer = MoveWriter(decimals)
             for piece in cut.pieces:
                 yield from writer.descend(piece, cut.top + self.clearance, cut.plunge / 60.0)
-                yield f"G0 Z{self.safe:g}"
+                yield f"G0 Z{safe}"
         if spindle is not None:
             yield "M5"
         yield "M2"
@@ -103,15 +104,18 @@ class Job:
     def _holes(self, cut: Cut, decimals: int) -> Iterator[str]:
         holes = cut.holes
         assert holes is not None
-        word = f"G83 Q{holes.peck:g}" if holes.peck else (f"G82 P{holes.dwell:g}" if holes.dwell else "G81")
-        for k, (x, y) in enumerate(holes.places.tolist()):
-            place = f"X{round(x, decimals) + 0.0:g} Y{round(y, decimals) + 0.0:g}"
-            if k == 0:
-                yield f"G99 {word} {place} Z{holes.bottom:g} R{cut.top + self.clearance:g} F{cut.plunge:g}"
-            else:
-                yield place
+        word = "G81"
+        if holes.peck:
+            word = f"G83 Q{written(holes.peck, 6)}"
+        elif holes.dwell:
+            word = f"G82 P{written(holes.dwell, 6)}"
+        above, bottom = written(cut.top + self.clearance, decimals), written(holes.bottom, decimals)
+        depths = f" Z{bottom} R{above} F{written(cut.plunge, 6)}"
+        for k, place in enumerate(holes.places.tolist()):
+            x, y = (written(value, decimals) for value in place)
+            yield f"X{x} Y{y}" if k else f"G99 {word} X{x} Y{y}{depths}"
         yield "G80"
-        yield f"G0 Z{self.safe:g}"
+        yield f"G0 Z{written(self.safe, decimals)}"
 
 
 def read_job(path: Path) -> Job:
@@ -157,6 +161,9 @@ def _drawing(top: TomlTable, folder: Path) -> Drawing | None:
     text, file = top.inner("text"), top.read("drawing")
     if text is not None and file is not None:
         raise top.fault("drawing", "and [text] are two drawings; leave one out")
+    for key in ("unit",) if text is not None else () if file is not None else ("unit", "origin", "at"):
+        if key in top:
+            raise top.fault(key, f"is of a drawing{' in a file' * (text is not None)}, and there is none; leave it out")
     unit = top.read("unit")
     found: Drawing | None = None
     if text is not None:

@@ -13,12 +13,24 @@ from rds.core.errors import InputError
 from rds.core.quantities import Choice, Declaration, Flag, Items, Quantity, Table, Text
 from rds.nc.language.tool_library import ShapedTool
 from rds.nc.machining.area import area_of, nearest_order, offset, pocket_rings, polygons, rings
-from rds.nc.machining.ways import Piece, at_height, levels, lines, path, ramp, ring_at, ring_with_tabs
+from rds.nc.machining.ways import (
+    Piece,
+    along,
+    at_height,
+    levels,
+    lines,
+    path,
+    ramp,
+    rest_of_tab,
+    ring_at,
+    ring_with_tabs,
+)
 from rds.nc.shapes.centre_lines import centre_lines
 from rds.nc.shapes.curves import Curve, Drawing
 
 _LAYER = Text("layer of the drawing that it takes; by default all of it")
 _POINT = Items("a place", Quantity("coordinate", "mm"), "[x, y], two numbers in mm", 2)
+_MOST_HOLES = 100_000  # of a pattern
 _COMMON: dict[str, Declaration] = {
     "do": Text("which operation"),
     "name": Text("what comments call it", default=""),
@@ -214,6 +226,8 @@ def _contour(cut: Cut, given: dict[str, Any], drawing: Drawing | None, tolerance
     curves = _curves(given, drawing, owner)
     side, radius = given["side"], cut.tool.diameter / 2.0
     if side == "on":
+        if given["stock_to_leave"]:
+            raise InputError(f"{owner}: nothing is left beside a curve that is cut on; leave stock_to_leave out")
         found = [
             np.vstack((curve.points, curve.points[:1])) for curve in curves if curve.closed and len(curve.points) > 2
         ]
@@ -246,6 +260,10 @@ def _contour(cut: Cut, given: dict[str, Any], drawing: Drawing | None, tolerance
         before, start, piece = given["top"], 0.0, []  # type: float, float, Piece
         for z in heights:
             if tabs and z < roof - 1e-9:
+                on = rest_of_tab(start, tabs, total)
+                if on and piece:  # at the height before, where the ring has been cut
+                    piece += path(at_height(along(ring, start, on), before), feed, tolerance)
+                start = (start + on) % total
                 down = lines([(*_place(ring, start), before), (*_place(ring, start), z)], plunge)
                 piece += down + ring_with_tabs(ring, start, z, tabs, roof, feed, plunge, tolerance)
             else:
@@ -259,15 +277,11 @@ def _contour(cut: Cut, given: dict[str, Any], drawing: Drawing | None, tolerance
 
 
 def _place(ring: np.ndarray, start: float) -> np.ndarray:
-    from rds.nc.machining.ways import along
-
     return along(ring, start, 1e-6)[0]
 
 
 def _turned(ring: np.ndarray, start: float) -> np.ndarray:
     """The ring, beginning at the distance `start` along it."""
-    from rds.nc.machining.ways import along
-
     return along(ring, start, float(np.hypot(*np.diff(ring, axis=0).T).sum()))
 
 
@@ -275,18 +289,27 @@ def _drill(cut: Cut, given: dict[str, Any], drawing: Drawing | None, tolerance: 
     patterns = [key for key in ("grid", "circle") if given[key]]
     if len(patterns) > 1 or (patterns and given["layer"]):
         raise InputError(f"{owner}: a layer, a grid or a circle; leave two of them out")
+    if given["at"] and given["layer"]:
+        raise InputError(f"{owner}: the holes of a layer are where its circles and points are; leave at out, or layer")
+    if given["peck"] and given["dwell"]:
+        raise InputError(f"{owner}: the cycle that pecks (G83) does not dwell; leave peck or dwell out")
     x, y = given["at"] or (0.0, 0.0)
     if given["grid"]:
         nx, ny, dx, dy = given["grid"]
-        if nx != int(nx) or ny != int(ny) or not 1 <= nx * ny <= 100000:
-            raise InputError(f"{owner}: grid = {list(given['grid'])} must begin with two whole numbers of holes")
+        if nx != int(nx) or ny != int(ny) or min(nx, ny) < 1 or nx * ny > _MOST_HOLES:
+            raise InputError(
+                f"{owner}: grid = {list(given['grid'])} must begin with two whole numbers of holes, from 1, and have"
+                f" {_MOST_HOLES} at most"
+            )
         places = [
             (x + i * dx, y + (j if i % 2 == 0 else ny - 1 - j) * dy) for i in range(int(nx)) for j in range(int(ny))
         ]
     elif given["circle"]:
         n, radius, angle = given["circle"]
-        if n != int(n) or not 1 <= n <= 100000:
-            raise InputError(f"{owner}: circle = {list(given['circle'])} must begin with a whole number of holes")
+        if n != int(n) or not 1 <= n <= _MOST_HOLES:
+            raise InputError(
+                f"{owner}: circle = {list(given['circle'])} must begin with a whole number of holes, 1 to {_MOST_HOLES}"
+            )
         turns = [angle * pi / 180.0 + 2.0 * pi * k / n for k in range(int(n))]
         places = [(x + radius * cos(turn), y + radius * sin(turn)) for turn in turns]
     elif given["at"] and not given["layer"]:

@@ -77,6 +77,16 @@ def ring_at(ring: np.ndarray, start: float, z: float, feed: float, tolerance: fl
     return path(at_height(along(ring, start % total, total), z), feed, tolerance)
 
 
+def rest_of_tab(start: float, tabs: list[tuple[float, float]], total: float) -> float:
+    """How far the tab goes on that the distance `start` along a ring of `total` mm lies in; 0 beside all tabs."""
+    rests = ((middle + width / 2 - start) % total for middle, width in tabs if _into(start, middle, width, total))
+    return max(rests, default=0.0)
+
+
+def _into(start: float, middle: float, width: float, total: float) -> bool:
+    return 1e-9 < (start - middle + width / 2) % total < width - 1e-9
+
+
 def ring_with_tabs(
     ring: np.ndarray,
     start: float,
@@ -87,7 +97,10 @@ def ring_with_tabs(
     plunge: float,
     tolerance: float,
 ) -> Piece:
-    """Once around a ring at z, and at `top` over the tabs: distances along the ring (middle, width), mm."""
+    """Once around a ring at z, and at `top` over the tabs: distances along the ring (middle, width), mm.
+
+    `start` lies in none of them.
+    """
     total = float(np.hypot(*np.diff(ring, axis=0).T).sum())
     start %= total
     spans = sorted(((middle - width / 2 - start) % total, width) for middle, width in tabs)

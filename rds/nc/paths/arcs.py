@@ -10,6 +10,7 @@ from rds.core.types import ArcSegment, Segment
 from rds.nc.paths.numbers import ANGLE, COORDINATE, FEED_RATE, POSITIVE, number, point
 
 MOST_TURNS = 10_000
+_WHOLE = 1e-9  # of a turn, by which a sweep may be off a whole one for rounding
 
 
 def arc(
@@ -38,7 +39,8 @@ def arc(
     bottom = top if end_depth is None else 0.0 - number(end_depth, "end depth", "arc", COORDINATE)
     if abs(swept) < 1e-9:
         raise InputError(f"arc: sweep = {sweep!r} is no arc; give degrees, counter-clockwise positive, 360: a circle")
-    turns = ceil(abs(swept) / 360.0)
+    turns = max(1, ceil(abs(swept) / 360.0 - _WHOLE))
+    is_whole = abs(abs(swept) - 360.0 * turns) <= 360.0 * _WHOLE
     if turns > MOST_TURNS:
         raise InputError(f"arc: sweep = {sweep!r} is {turns} turns; give at most {MOST_TURNS}")
 
@@ -48,9 +50,9 @@ def arc(
     segments: list[Segment] = []
     here = on_circle(first, top)
     for turn in range(turns):
-        done = min((turn + 1) * 360.0 / abs(swept), 1.0)
+        done = (turn + 1) * 360.0 / abs(swept) if turn < turns - 1 else 1.0
         there = on_circle(first + swept * done, top + (bottom - top) * done)
-        if done < 1.0 or abs(swept) % 360.0 == 0.0:  # a whole turn ends exactly where it began
+        if turn < turns - 1 or is_whole:  # a whole turn ends exactly where it began
             there = (here[0], here[1], there[2])
         segments.append(ArcSegment(here, there, (x, y, here[2]), feed, clockwise=swept < 0))
         here = there

@@ -19,7 +19,7 @@ from rds.nc.paths.lines import polyline
 from rds.nc.paths.measure import without_repeats
 from rds.nc.paths.numbers import COORDINATE, FARTHEST, FEED_RATE, number
 
-UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, "inch": 25.4}
+UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "\u03bcm": 1e-3, "in": 25.4, "inch": 25.4}
 TOLERANCE = Quantity("how far arcs may be from the lines between the points", "mm", above=0.0)
 MOST_POINTS = 2_000_000
 _LONGEST_LINE = 1000  # characters

@@ -83,18 +83,18 @@ def _lines(
         yield comment(line)
     yield "G17 G21 G40 G90 G91.1 G94"
     if blend is not None:
-        yield f"G64 P{_number(blend, max(decimals, DECIMALS))}"
+        yield f"G64 P{written(blend, max(decimals, DECIMALS))}"
     if spindle is not None:
-        yield f"S{_number(spindle, 3)} M3"
+        yield f"S{written(spindle, 3)} M3"
     writer = MoveWriter(decimals)
     if safe_height is not None:
-        yield f"G0 Z{_number(safe_height, decimals)}"
+        yield f"G0 Z{written(safe_height, decimals)}"
     for piece in found:
         yield from writer.approach(piece[0], safe_height)
         for segment in piece:
             yield from writer.cut(segment)
         if safe_height is not None:
-            yield f"G0 Z{_number(safe_height, decimals)}"
+            yield f"G0 Z{written(safe_height, decimals)}"
     if spindle is not None:
         yield "M5"
     yield "M2"
@@ -162,10 +162,10 @@ class MoveWriter:
         return tuple(round(value, self.decimals) + 0.0 for value in point)
 
     def _word(self, value: float) -> str:
-        return _number(value, self.decimals)
+        return written(value, self.decimals)
 
     def _feed(self, segment: Segment) -> str:
-        word = f" F{_number(segment.feed_rate * 60.0, 6)}"
+        word = f" F{written(segment.feed_rate * 60.0, 6)}"
         if word == " F0":
             raise InputError(f"program: feed rate = {segment.feed_rate:g} mm/s is F0 in a program; give a larger one")
         if word == self.feed:
@@ -222,7 +222,8 @@ def _check_segment(segment: Segment) -> None:
         )
 
 
-def _number(value: float, decimals: int) -> str:
+def written(value: float, decimals: int) -> str:
+    """The value as programs have it: no exponent, no zeros at its end."""
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     return "0" if text in ("-0", "") else text

@@ -85,7 +85,7 @@ def stepwise(program: Program) -> Program:
 
     def order(each: ProgramEvent) -> tuple[int, bool, bool]:
         """What a line does itself comes before its end."""
-        return each.sample, each.line != lines[each.sample], each in steps
+        return each.sample, each.line != lines[each.sample], each.kind == "stop" and each.value == STEP
 
     happenings = sorted((*program.happenings, *steps), key=order)
     return replace(program, happenings=tuple(happenings), steps=True)

@@ -35,7 +35,7 @@ from rds.nc.interpolator_segments import program as moves_of
 from rds.nc.path_block import PathBlock
 from rds.nc.run.judge import judged
 from rds.nc.run.path_method import MOST_SAMPLES, Method, program_of
-from rds.nc.run.path_segments import check_room, in_machine_axes, without_idle
+from rds.nc.run.path_segments import in_room, without_idle
 from rds.nc.run.prepare import Prepared, planned, prepare
 from rds.nc.setup import Setup
 from rds.results import Result
@@ -166,8 +166,7 @@ def _planned(
     At rest at the end of the segments in `rests`.
     """
     check_chain(segments, T)
-    check_room(segments, lines, machine, axes)
-    path = in_machine_axes(segments, lines, [AXES.index(each) for each in axes])
+    path = in_room(segments, lines, machine, axes)
     if profile == BLENDED:
         path["mode"] = BLEND
     path["mode"][list(rests)] = EXACT_STOP

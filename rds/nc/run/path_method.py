@@ -12,14 +12,14 @@ from rds.core.errors import InputError
 from rds.core.geometry import length
 from rds.core.types import ArcSegment, Segment
 from rds.interpolators.acceleration import Acceleration, smooth_one_by_one
-from rds.interpolators.interpolator import Interpolator
+from rds.interpolators.interpolator import Interpolator, common_blu
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.segments import AXES
 from rds.interpolators.path import check_chain
 from rds.machines import Machine
 from rds.modes.loop.interpolated import LEAST_AHEAD
 from rds.modes.loop.program import InterpolatedProgram, ProgramEvent, Row, Stretch, dwell_samples
-from rds.nc.run.path_segments import check_room, in_machine_axes
+from rds.nc.run.path_segments import in_room
 
 MOST_SAMPLES = 20_000_000
 
@@ -57,15 +57,16 @@ def program_of(
 ) -> InterpolatedProgram:
     """The program of these segments; `due` says after which of them the axes rest, and what happens there."""
     check_chain(segments, T)
-    check_room(segments, lines, machine, axes)
+    path = in_room(segments, lines, machine, axes)
     weights = method.acceleration.weights(T) if method.acceleration else np.ones(1)
     lines_by, arcs_by = method.interpolator, method.arcs or method.interpolator
+    blu = common_blu(method.interpolators)
     ends = set(due) | (set(range(len(segments))) if method.exact_stop else set()) | {len(segments) - 1}
     stretches, begin, samples = [], 0, 1
     for end in sorted(ends):
         part = tuple(segments[begin : end + 1])
         happens = tuple(due.get(end, ()))
-        stretches.append(Stretch(_Rows(part, begin, lines_by, arcs_by, weights, T), happens))
+        stretches.append(Stretch(_Rows(part, begin, lines_by, arcs_by, weights, blu, T), happens))
         samples += sum(ceil(length(each) / each.feed_rate / T - 1e-9) for each in part) + len(weights) - 1
         samples += sum(dwell_samples(each.value, T) for each in happens if each.kind == "dwell")
         begin = end + 1
@@ -88,7 +89,7 @@ def program_of(
         home=(0.0,) * len(axes),
         limits=np.array([limits.velocity, limits.acceleration, limits.jerk])[:, order],
         travel=np.array([machine.axes[each].travel for each in axes], dtype=float),
-        path=in_machine_axes(segments, lines, order),
+        path=path,
         about={
             "interpolator": ", arcs by ".join(each.name for each in method.interpolators),
             "interpolator_params": dict(method.interpolator.params),
@@ -110,11 +111,11 @@ class _Rows:
     lines: Interpolator
     arcs: Interpolator
     weights: np.ndarray
+    blu: float | None
     T: float
 
     def __call__(self) -> Iterator[Row]:
         number = self.first - 1
-        blu = next((each.blu for each in (self.lines, self.arcs) if each.blu is not None), None)
 
         def made() -> Iterator[np.ndarray]:
             nonlocal number
@@ -126,5 +127,5 @@ class _Rows:
         if len(self.weights) > 1:
             rows = smooth_one_by_one(rows, self.segments[0].start, self.weights, self.T)
         for position, velocity, acceleration in rows:
-            at = position if blu is None else np.rint(position / blu) * blu
+            at = position if self.blu is None else np.rint(position / self.blu) * self.blu
             yield at.tolist(), velocity.tolist(), acceleration.tolist(), number

@@ -11,10 +11,9 @@ from rds.core.errors import InputError
 from rds.core.geometry import PLANES, length
 from rds.core.types import ArcSegment, Segment
 from rds.interpolators.motion.segments import AXES, arc, line
-from rds.interpolators.segment import Arc
 from rds.machines import Machine
+from rds.nc.extent import extents
 
-_ARC_POINTS = 65  # of an arc, looked at for the travel of the axes
 _LINEAR = AXES[:3]
 
 
@@ -42,28 +41,32 @@ def without_idle(axes: Sequence[str], segments: Sequence[Segment]) -> tuple[list
     return [axes[i] for i in kept], found
 
 
-def check_room(segments: Sequence[Segment], lines: Sequence[int], machine: Machine, axes: Sequence[str]) -> None:
-    """InputError for a path that leaves the travel of an axis, an arc of a rotary axis, or axes that no path moves."""
+def in_room(segments: Sequence[Segment], lines: Sequence[int], machine: Machine, axes: Sequence[str]) -> np.ndarray:
+    """The segments as rows of SEGMENT. InputError for axes that no path moves, an arc of a rotary axis, or a path that
+    leaves the travel of an axis.
+    """
     if list(axes) != [name for name in AXES if name in axes]:
         raise InputError(
             f"a path moves {', '.join(AXES)}, in that order, and the run has {', '.join(axes)}; change axes"
         )
     for segment, number in zip(segments, lines, strict=True):
-        points = np.array([segment.start, segment.end])
-        if isinstance(segment, ArcSegment):
-            if turning := [axes[i] for i in segment.plane if axes[i] not in _LINEAR]:
-                raise InputError(f"segment {number} is an arc in which {turning[0]} takes part; arcs are of X, Y and Z")
-            points = Arc.of(segment).points(np.linspace(0.0, 1.0, _ARC_POINTS))
-        for i, name in enumerate(axes):
-            (low, high), unit = machine.axes[name].travel, machine.axes[name].unit
-            if points[:, i].min() < low - 1e-9 or points[:, i].max() > high + 1e-9:
-                raise InputError(
-                    f"segment {number} takes {name} from {points[:, i].min():g} to {points[:, i].max():g} {unit}; "
-                    f"it travels from {low:g} to {high:g} {unit}; move the path into that range"
-                )
+        if isinstance(segment, ArcSegment) and (turning := [axes[i] for i in segment.plane if axes[i] not in _LINEAR]):
+            raise InputError(f"segment {number} is an arc in which {turning[0]} takes part; arcs are of X, Y and Z")
+    rows = _in_machine_axes(segments, lines, [AXES.index(name) for name in axes])
+    least, most = extents(rows)
+    for name in axes:
+        k, (low, high), unit = AXES.index(name), machine.axes[name].travel, machine.axes[name].unit
+        beyond = (least[:, k] < low - 1e-9) | (most[:, k] > high + 1e-9)
+        if beyond.any():
+            at = int(beyond.argmax())
+            raise InputError(
+                f"segment {lines[at]} takes {name} from {least[at, k]:g} to {most[at, k]:g} {unit}; "
+                f"it travels from {low:g} to {high:g} {unit}; move the path into that range"
+            )
+    return rows
 
 
-def in_machine_axes(segments: Sequence[Segment], lines: Sequence[int], order: Sequence[int]) -> np.ndarray:
+def _in_machine_axes(segments: Sequence[Segment], lines: Sequence[int], order: Sequence[int]) -> np.ndarray:
     """The segments as rows of SEGMENT; `order` has the index in AXES of each position."""
     planes = list(PLANES.values())
     rows = []

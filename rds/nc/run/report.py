@@ -175,7 +175,7 @@ def _changes(result: Result) -> Table:
 
 def _program_lines(file: Path) -> list[str]:
     try:
-        return file.read_text(encoding="utf-8", errors="replace").splitlines()
+        return file.read_bytes().decode("utf-8-sig", "replace").split("\n")  # as the interpreter counts lines
     except OSError:  # it was there when it was read
         return []
 

@@ -99,11 +99,14 @@ def serial_motion(
 ) -> SerialMotion:
     """The motion of the program in `file` for the nodes of `machine`, in steps of `period` s.
 
-    `whole`: position bytes of a serial line carry it, whole BLU. InputError as `prepare`.
+    `whole`: position bytes of a serial line carry it, whole BLU. InputError as `prepare`, and for a program that moves
+    nothing.
     """
     if motion not in MOTIONS:
         raise InputError(f"motion {motion!r} is unknown; known: {', '.join(MOTIONS)}")
     prepared = prepare(file, machine, setup, period, progress)
+    if not len(prepared.path):
+        raise InputError("nothing in it moves: there is nothing for nodes to carry out", str(file))
     program = prepared.program
     axes = program.axes
     blu = np.array([machine.axis(name).resolution for name in axes])

@@ -13,15 +13,17 @@ from rds.nc.shapes.svg import read_svg
 
 
 def read_vector_drawing(file: str, unit: str | None = None) -> Drawing:
-    """The drawing in an SVG or DXF file, by the ending of its name. `unit`: mm, cm, m or in, where the file says none.
+    """The drawing in an SVG or DXF file, by the ending of its name. `unit`: mm, cm, m or in, of a DXF file.
 
-    InputError for a file that is neither, damaged, or has nothing to machine.
+    InputError for a file that is neither, damaged, or has nothing to machine, and for a unit beside an SVG file.
     """
     path = Path(file)
     ending = path.suffix.lower()
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # which `checked` looks for
             if ending == ".svg":
+                if unit is not None:
+                    raise InputError("is an SVG, which says its own size; leave the unit out")
                 return checked(read_svg(path))
             if ending == ".dxf":
                 return checked(read_dxf(path, unit))

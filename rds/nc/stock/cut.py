@@ -79,6 +79,7 @@ class Carving:
     loads: dict[int, ToolLoad] = field(default_factory=dict)
     faults: list[CutFault] = field(default_factory=list)
     spindle: float = 0.0  # rev/min
+    _known: dict[tuple[int, str], int] = field(default_factory=dict)  # places in `faults`, by line and kind
 
     def tool(self, number: int, line: int = 0) -> ShapedTool:
         """A tool of the library. InputError where it has none of this number."""
@@ -101,12 +102,13 @@ class Carving:
 
     def _block(self, block: PathBlock, spindle: np.ndarray) -> None:
         rows = block.segments
-        if (rows["tip"] != JOINTS).any() or (rows["start"][:, 3:] != rows["end"][:, 3:]).any():
-            line = int(rows["line"][0])
+        turns = (rows["tip"] != JOINTS) | (rows["start"][:, 3:] != rows["end"][:, 3:]).any(axis=1)
+        if turns.any():
+            line = int(rows["line"][turns.argmax()])
             raise InputError(f"line {line}: rotary axes move; a height field is cut from above, by X, Y and Z alone")
         if block.tool not in self.tools and not (~rows["rapid"]).any():
             return  # before the first tool change
-        tool = self.tool(block.tool, int(rows["line"][0]))
+        tool = self.tool(block.tool, int(rows["line"][(~rows["rapid"]).argmax()]))
         points, owner = sample(rows, ARC_STEP)
         points = np.vstack((rows["start"][0, :3], points)) - (0.0, 0.0, tool.length)
         owner = np.concatenate((owner[:1], owner))
@@ -170,11 +172,11 @@ class Carving:
 
     def _fault(self, line: int, kind: str, value: float) -> None:
         """One for each line and kind, with the largest value."""
-        for k, fault in enumerate(self.faults):
-            if fault.line == line and fault.kind == kind:
-                self.faults[k] = CutFault(line, kind, max(value, fault.value))
-                return
-        self.faults.append(CutFault(line, kind, value))
+        k = self._known.setdefault((line, kind), len(self.faults))
+        if k == len(self.faults):
+            self.faults.append(CutFault(line, kind, value))
+        elif value > self.faults[k].value:
+            self.faults[k] = CutFault(line, kind, value)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -88,8 +89,8 @@ class Stock:
         try:
             with np.load(path, allow_pickle=False) as saved:
                 heights, place = np.asarray(saved["heights"], float), np.asarray(saved["place"], float)
-        except (OSError, ValueError, KeyError) as error:
-            raise InputError("holds no heights that a cut has saved", str(path)) from error
+        except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
+            raise InputError("holds no heights that a cut has saved; save them again (--save)", str(path)) from error
         if heights.shape != self.heights.shape or not np.allclose(place[:3], [self.x0, self.y0, self.cell]):
             raise InputError("has the heights of other cells; give both cuts the same --stock and --cell", str(path))
         return heights
