@@ -17,7 +17,7 @@ import can
 import pytest
 from waiting import wait_for
 
-from rds.bus.hub import wire
+from rds.bus.hub import connect, wire
 from rds.bus.hub.error_states import SEATS, Board
 from rds.bus.hub.hub_loop import STALL
 
@@ -400,3 +400,11 @@ def test_a_bus_that_is_shut_down_ends_fast_periodic_sending_quietly(
         sender.shutdown()
         assert not any(task.thread.is_alive() for task in tasks)  # type: ignore[attr-defined]
     assert said == []
+
+
+def test_a_hub_that_never_starts_is_given_up_where_no_process_forks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On Windows the hub says by a file that it listens; one that ends at once must not be started for ever."""
+    monkeypatch.delattr(os, "fork", raising=False)
+    monkeypatch.setattr(connect, "_start_hub_on_windows", lambda address, deadline: time.sleep(0.01))
+    with pytest.raises(TimeoutError, match="the hub of channel 'test' did not start in time"):
+        connect.join("test", False, (), wire.Settings(), timeout=0.1)

@@ -59,6 +59,8 @@ def join(
             else:
                 os.close(lock)
                 _start_hub_on_windows(address, deadline)
+                if time.monotonic() > deadline:
+                    raise TimeoutError(f"the hub of channel {channel!r} did not start in time")
         elif time.monotonic() > deadline:
             raise TimeoutError(
                 f"channel {channel!r} has a hub that does not listen; end process {address.holder() or 'unknown'}"
