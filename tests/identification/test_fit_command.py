@@ -69,12 +69,15 @@ def test_split_validates_on_what_was_not_fitted(tmp_path: Path) -> None:
 
 
 def test_the_report_is_a_page_with_a_picture_for_each_log(tmp_path: Path) -> None:
-    logs = [csv(tmp_path / f"{seed}.csv", axis_log(X, seed=seed, seconds=2.0)) for seed in (1, 2)]
+    logs = []
+    for seed in (1, 2):  # files of one name in two folders
+        (tmp_path / str(seed)).mkdir()
+        logs.append(csv(tmp_path / str(seed) / "x.csv", axis_log(X, seed=seed, seconds=2.0)))
     code, out, _ = run(*logs, "--structure", "axis", "--report", tmp_path / "page")
     assert code == 0
     assert "friction_minus" in out and "free run" in out and "100 ahead" in out
     page = (tmp_path / "page" / "fit.html").read_text()
-    assert page.count("<img") == 2 and "To doubt" in page
+    assert page.count("<img") == 2 and "To doubt" in page and "<h2>x (1)</h2>" in page and "<h2>x (2)</h2>" in page
     assert sorted(path.name for path in (tmp_path / "page").glob("*.png")) == ["fit-1.png", "fit-2.png"]
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from rds.core.atomic import write_files
 from rds.identification.fit.estimate_json import correlation_rows, described, error_rows, note, parameter_rows, to_json
+from rds.identification.logs.log import named_apart
 from rds.results.html import notes_list, table
 from rds.results.report import page
 
@@ -28,7 +29,7 @@ _POINTS = 20_000  # that a line of a picture is drawn with
 def write_fit(folder: Path, estimate: Estimate, logs: Sequence[Log], structure: Structure) -> list[Path]:
     """Write the page, a picture for each log and the numbers into `folder`, all or none; the page is first."""
     pictures = []
-    for number, log in enumerate(logs, 1):
+    for number, log in enumerate(named_apart(logs), 1):
         run = free_run_picture(estimate, log, structure).png()
         pictures.append(_Drawn(f"fit-{number}.png", log.name, "measured and free run", run))
         if estimate.method == "frequency":

@@ -16,7 +16,7 @@ from rds.identification.fit.free_run_doubts import MISSED
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.fit.solve import least_squares
-from rds.identification.logs.log import RATES, Log
+from rds.identification.logs.log import RATES, Log, named_apart
 from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import LIBRARY, structure
@@ -46,6 +46,7 @@ def missing_option(estimate: Estimate, logs: Sequence[Log]) -> str | None:
     """
     if estimate.method != SIMULATION_ERROR or estimate.structure not in LIBRARY.names():
         return None
+    logs = named_apart(logs)
     if all(estimate.free_run[log.name].rmse <= MISSED * motion_of(log).noise for log in logs):
         return None
     untellable = (*_UNTELLABLE, "backlash") if estimate.output_unit in RATES else _UNTELLABLE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -153,6 +153,24 @@ class Log:
             position=self.position[chosen],
             extra={key: values[chosen] for key, values in self.extra.items()},
         )
+
+
+def apart(names: Sequence[str]) -> list[str]:
+    """The names, numbered where they repeat, so that no two are the same: `log (1)`, `log (2)`."""
+    found: list[str] = []
+    for name in names:
+        own, number = name, 0
+        while own in found or (own in names if number else names.count(name) > 1):
+            number += 1
+            own = f"{name} ({number})"
+        found.append(own)
+    return found
+
+
+def named_apart(logs: Sequence[Log]) -> list[Log]:
+    """The logs by names of their own: whatever is said of several logs is said by name."""
+    names = apart([log.name for log in logs])
+    return [replace(log, name=name) if log.name != name else log for log, name in zip(logs, names, strict=True)]
 
 
 def only_log(given: Any) -> Log:
