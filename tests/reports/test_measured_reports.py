@@ -85,6 +85,14 @@ def test_reconfiguration_times_from_events(tmp_path: Path) -> None:
     assert "not ready again at its end, after changes of A" in report.findings[0]
 
 
+def test_events_need_not_be_in_order(tmp_path: Path) -> None:
+    log = tmp_path / "events.csv"
+    log.write_text("time_s,event,module\n9,moving,\n1,removed,Z\n6,added,Z\n7,ready,\n2,moving,\n")
+    report = make_report("reconfiguration", [log])
+    means = dict(zip(*(report.table("Reconfiguration time").column(name) for name in ("time", "mean [s]")), strict=True))
+    assert means["first change until ready"] == 6.0 and means["last module plugged in until moving"] == 3.0
+
+
 @pytest.mark.parametrize(
     ("table", "ours", "printed"),
     [
