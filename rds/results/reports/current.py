@@ -86,13 +86,15 @@ def _read(path: Path, settings: Mapping[str, Any]) -> list[Current]:
     found = []
     for column in currents:
         values = _AMPERES[column.unit] * np.asarray(column.numbers(blanks=timed is None))
-        if time is None and settings["period"] is not None:
-            at: np.ndarray | None = settings["period"] * np.arange(len(values))
-        else:
-            at = time
+        at = time if settings["period"] is None else settings["period"] * _rows_read(column)
         name = path.stem if len(currents) == 1 else f"{path.stem} {column.name}"
         found.append(Current(name, path.stem, str(path), values, at))
     return found
+
+
+def _rows_read(column: Column) -> np.ndarray:
+    """Which rows, from 0, have a reading in this column."""
+    return np.flatnonzero([bool(cell) for cell in column.cells.values()])
 
 
 def _time(column: Column) -> np.ndarray:
