@@ -37,6 +37,8 @@ def test_a_model_three_times_off_does_not_hide_in_its_own_loop() -> None:
     assert any(r.kind == "loop" and "simulated in the loop itself" in r.what for r in found.verdict.reasons)
     with pytest.raises(InputError, match=r"the experiment has a sample period of 0\.001 s, and the log one of 0\.002"):
         in_loop(right, replace(data, time=2.0 * data.time), simulate)
+    with pytest.raises(InputError, match="the experiment has 4000 samples, and the log begins at its sample 5000"):
+        in_loop(right, replace(data, first=5000), simulate)
 
 
 @pytest.mark.parametrize("name", ["pid", "tracking", "cascade"])
@@ -47,6 +49,7 @@ def test_the_loop_of_a_result_is_known_from_the_result(name: str, tmp_path: Path
     known = own_loop(data)
     assert isinstance(known, OwnLoop) and known.late == 0
     assert in_loop(candidate(), data, known.simulate).rmse < 2e-3
+    assert in_loop(candidate(), data.part(1200, 2000), known.simulate).rmse < 2e-3
     if name == "pid":
         found = validate(candidate(X | {"tau": 3.0 * X["tau"]}), data)
         assert any(r.kind == "loop" and r.side == "against" for r in found.verdict.reasons)

@@ -29,6 +29,7 @@ from rds.models import library_model
 from rds.results.result import Result
 
 _AS_NOISE = 1.5  # times the measurement's noise: what is nearer, noise explains
+_LEAST = 20  # samples
 _SETTLING = 0.05  # of the log, at its begin: where the axis may have been elsewhere
 
 
@@ -65,10 +66,17 @@ def in_loop(candidate: Candidate, log: Log, simulate: Loop) -> InLoop:
             "experiment that was logged",
             log.source or log.name,
         )
-    n = min(len(log), len(result))
+    n = min(len(log), len(result) - log.first)
+    if n < _LEAST:
+        raise InputError(
+            f"the experiment has {len(result)} samples, and the log begins at its sample {log.first}; give the "
+            "experiment that was logged",
+            log.source or log.name,
+        )
+    same = slice(log.first, log.first + n)  # of a log that is a part of what was logged
     reference = log.extra.get("reference")
-    wanted = np.asarray(result[f"{axis}_reference"] if reference is None else reference, dtype=float)[:n]
-    measured, simulated = log.position[:n], np.asarray(result[f"{axis}_measured"], dtype=float)[:n]
+    wanted = np.asarray(result[f"{axis}_reference"][same] if reference is None else reference[:n], dtype=float)
+    measured, simulated = log.position[:n], np.asarray(result[f"{axis}_measured"][same], dtype=float)
     counted = slice(round(_SETTLING * n), n)
     return InLoop(
         rmse=float(np.std((simulated - measured)[counted])),
