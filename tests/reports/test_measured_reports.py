@@ -213,3 +213,14 @@ def test_a_modules_record_of_acceleration_and_current_serves_both_reports(tmp_pa
     path.write_text("time [s],T_current [A]\n0,1\n1,1\n")
     with pytest.raises(InputError, match="'T_current \\[A\\]' is in 'A'; readings of an accelerometer are in adc or g"):
         make_report("vibration", [path])
+
+
+def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
+    files = [tmp_path / trial / "c.csv" for trial in ("first", "second")]
+    for file in files:
+        file.parent.mkdir()
+        save(file, CURRENT_X)
+    report = make_report("current", files)
+    assert list(report.figures) == [f"Current of {tmp_path.as_posix()}/{trial}/c" for trial in ("first", "second")]
+    rows = report.table("Starting and running").column("current")
+    assert len(set(rows)) == 4 and rows[0] == f"{tmp_path.as_posix()}/first/c cw"
