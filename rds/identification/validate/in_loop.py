@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import sqrt
-from pathlib import Path
 
 import numpy as np
 
@@ -138,15 +137,14 @@ def _of_loop(found: InLoop, bands: Bands) -> Iterator[Reason]:
 
 def _model(candidate: Candidate) -> Model:
     """The model as one that an experiment takes."""
+    if candidate.model is not None:
+        return candidate.model
     made = candidate.structure
     if candidate.source:
-        from rds.core.load import load_student
         from rds.identification.fit.model_file import read_model
         from rds.identification.fit.run_model import run_model
-        from rds.models.student import student_model
 
-        path = Path(candidate.source)
-        return run_model(read_model(path)) if path.suffix == ".toml" else student_model(load_student(path))
+        return run_model(read_model(candidate.source))
     if made.name.endswith(".py"):
         raise InputError(f"the model {candidate.name} is no file, and only a file is simulated in a loop")
     table = library_table(made, candidate.values)
