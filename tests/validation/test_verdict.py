@@ -340,6 +340,8 @@ def test_bands_move_the_verdict_and_unknown_ones_are_refused() -> None:
         Bands.read({"fit": 90.0})
     with pytest.raises(InputError, match="band skill = -1 must be a number of 0 or more"):
         Bands(skill=-1)
+    none = Bands(gain_percent=0.0, phase_degrees=0.0, friction_percent=0.0)
+    assert validate(candidate(), log(FRESH), bands=none).verdict.word is not Word.VALID
 
 
 def test_units_that_differ_are_refused() -> None:
