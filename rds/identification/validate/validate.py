@@ -105,7 +105,7 @@ def validate(
     verdicts = {}
     for name, a in assessments.items():
         more = tuple(closed_loop_reasons(candidate, a, loop, bands))
-        verdicts[name] = with_alternatives(candidate, a, judge(candidate, a, bands, more), bands)
+        verdicts[name] = with_alternatives(candidate, a, judge(candidate, a, bands, more), bands, more)
     rankings = {name: _ranking(candidate, a, others, bands, initial_samples) for name, a in assessments.items()}
     return Validation(candidate, assessments, verdicts, bands, others, rankings if others else {})
 
