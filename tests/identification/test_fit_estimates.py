@@ -165,6 +165,7 @@ def test_predictions_stand_beside_the_free_run() -> None:
         ({"fixed": {"taw": 1.0}}, "did you mean 'tau'"),
         ({"fixed": {"tau": -1.0}}, "must be more than 0"),
         ({"fixed": {"friction_minus": 0.5}}, "must be at most 0"),
+        ({"fixed": {"K": 1.7}, "start": {"K": 2.0}}, r"K is held at 1\.7, so no search begins at 2; leave"),
         ({"speed": 1}, "has no option 'speed'"),
     ],
 )
