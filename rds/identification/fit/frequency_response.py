@@ -154,7 +154,12 @@ def _averaged(u: np.ndarray, y: np.ndarray, length: int, T: float) -> FrequencyR
     frequency = np.fft.rfftfreq(length, T)
     size = np.abs(U.mean(axis=0))
     band = (frequency > 0.0) & (frequency <= _HIGHEST * 0.5 / T)
-    excited = band & (size > _EXCITED * size[band].max())
+    excited = band & (size > _EXCITED * size[1:].max())
+    if not excited.any():
+        raise InputError(
+            f"the command excites no frequency up to {_HIGHEST * 0.5 / T:.4g} Hz ({_HIGHEST:.0%} of half the sampling "
+            "frequency); log a slower one, such as a multisine"
+        )
     count = periods - skip
     H = Y[:, excited].mean(axis=0) / U[:, excited].mean(axis=0)
     noise = Y[:, excited] - H * U[:, excited]
