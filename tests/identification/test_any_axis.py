@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
+from rds.identification.fit.design import left_out_of, linear_axis_of
 from rds.identification.fit.fit import fit
-from rds.identification.fit.friction_curve import friction_curve
+from rds.identification.fit.friction_curve import SteadyPoint, _fitted, friction_curve
 from rds.identification.fit.machine_file import write_machine
 from rds.identification.fit.model_file import read_model, write_model
 from rds.identification.fit.run_model import run_model
@@ -220,6 +221,17 @@ def test_a_friction_curve_from_runs_at_constant_speed() -> None:
     assert "inertia" in found.unidentifiable[0] and any(
         "below 0.5 mm/s" in sentence for sentence in found.unidentifiable
     )
+
+
+def test_the_errors_of_a_friction_curve_count_that_all_four_numbers_are_estimated() -> None:
+    draw, v = np.random.default_rng(1), np.array([0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0, 20.0, 40.0])
+    beyond = 0
+    for _ in range(60):
+        f = 8.0 + 4.0 * np.exp(-((v / 3.0) ** 2)) + 0.2 * v + 0.1 * draw.standard_normal(len(v))
+        points = [SteadyPoint("runs", 0.0, 1.0, *map(float, at), 0.1) for at in zip(v, f, strict=True)]
+        numbers, _ = _fitted(points, 1.0, "mm/s", "N", "mm/s")
+        beyond += abs(numbers["F_c"].value - 8.0) > 2.45 * numbers["F_c"].std_error  # Student's t of 6: 5 %
+    assert beyond <= 6
 
 
 def test_what_a_friction_curve_cannot_tell() -> None:
