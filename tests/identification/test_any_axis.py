@@ -259,6 +259,12 @@ def test_a_friction_curve_names_the_logs_that_gave_no_point() -> None:
     assert any(sentence.startswith("slow: no stretch of these logs") for sentence in found.unidentifiable)
 
 
+def test_a_design_says_what_it_leaves_out_of_one_direction() -> None:
+    both = left_out_of({"friction_plus": 0.5, "friction_minus": -0.5, "viscous_plus": 0.1})
+    assert left_out_of({"friction_plus": 0.0, "friction_minus": -0.5, "viscous_difference": 0.1}) == both
+    assert len(both) == 2
+
+
 def test_a_torque_against_the_motion_is_a_fault() -> None:
     log = turning(1)
     assert not any(f.kind == "sign" for f in with_findings(log).findings)
@@ -277,6 +283,7 @@ def test_a_log_of_a_speed_is_fitted_with_friction_of_each_direction_and_refused_
     for name, value in truth.items():
         assert found.parameters[name].value == pytest.approx(value, rel=0.01), name
         assert abs(found.parameters[name].value - value) < 4.0 * found.parameters[name].std_error
+    assert linear_axis_of(found).unit == "mm"  # of the position, whose speed it was
     with pytest.raises(InputError, match="takes positions, and the log has a speed alone"):
         fit([log], structure("axis"), "step")
     with pytest.raises(InputError, match="play shows in a position"):
