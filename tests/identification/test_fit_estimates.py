@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rds.core.errors import InputError
+from rds.identification.fit.estimate import Errors
 from rds.identification.fit.fit import fit
 from rds.identification.logs.log import Log
 from rds.identification.structures.axis_structure import make
@@ -157,6 +160,10 @@ def test_predictions_stand_beside_the_free_run() -> None:
     # the noise of two samples is in a prediction that starts from a measurement
     assert found.ahead[log.name][10].rmse == pytest.approx(np.sqrt(2.0) * found.free_run[log.name].rmse, rel=0.05)
     assert found.relative_error_percent is not None and found.relative_error_percent < 10.0
+    for of_rest in (("rest", log.name), (log.name, "rest")):  # an axis at rest has no fit, wherever its log stands
+        runs = {"rest": Errors(np.nan, 0.0, 0.0, "mm"), **found.free_run}
+        both = replace(found, free_run={name: runs[name] for name in of_rest}, logs=found.logs * 2)
+        assert both.to_json()["fit_percent"] == found.free_run[log.name].fit_percent
 
 
 @pytest.mark.parametrize(
