@@ -15,6 +15,7 @@ from rds.core.errors import InputError
 from rds.identification.fit.fit import fit
 from rds.identification.fit.model_file import read_model
 from rds.identification.logs.log import Log
+from rds.identification.structures import student_structure
 from rds.identification.structures.structures import structure
 from tests.identification.fit_logs import axis_log, mini_cnc
 
@@ -141,6 +142,22 @@ def test_derivatives_are_integrated_as_coarsely_as_the_noise_allows(tmp_path: Pa
     found = fit([log], structure(path)).parameters
     for name in ("tau", "K"):
         assert abs(found[name].value - X[name]) < 4.0 * found[name].std_error
+
+
+def test_how_coarsely_is_not_told_by_an_axis_at_rest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(student_structure, "_TRIED", 100)
+    path = tmp_path / "stiff.py"
+    path.write_text(
+        'params = {"tau": 0.0003, "K": 1.5}\n'
+        "def derivatives(t, x, u, params):\n"
+        '    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]\n'
+    )
+    log = axis_log(FREE, seconds=0.3)
+    log = replace(log, command=np.where(log.time < 0.15, 0.0, log.command))
+    made = structure(path)
+    assert made.prepare is not None
+    begun = {"tau": 0.0003, "K": 1.5}  # one Runge-Kutta step in a sample is unstable
+    assert np.abs(made.prepare([log]).respond(log.time, log.command, (0.0, 0.0), begun)).max() < 10.0  # mm
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
+from rds.identification.fit import starting_values
 from rds.identification.fit.estimate import Errors
 from rds.identification.fit.fit import fit
 from rds.identification.logs.log import Log
@@ -130,6 +131,22 @@ def test_two_logs_tell_more_than_one_and_each_has_its_own_initial_state() -> Non
     assert both.parameters["friction_plus"].std_error < 0.9 * one.parameters["friction_plus"].std_error
     for log in logs:
         assert both.initial_state[log.name][0] == pytest.approx(log.position[0], abs=0.005)
+
+
+def test_a_log_that_begins_with_a_long_rest_is_fitted_by_what_comes_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(starting_values, "MOST_SAMPLES", 1000)
+    truth = mini_cnc("X")
+    log = axis_log(truth, seconds=2.0)
+    before = np.zeros(1500)
+    log = Log(
+        "rests first",
+        np.arange(3500) * 0.001,
+        np.concatenate([before, log.command]),
+        np.concatenate([before + log.position[0], log.position]),
+        resolution=log.resolution,
+    )
+    for name, parameter in fit([log], make()).parameters.items():
+        assert abs(parameter.value - truth[name]) < 4.0 * parameter.std_error, name
 
 
 def test_irregular_times_are_used_as_they_are() -> None:

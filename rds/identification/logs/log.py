@@ -155,6 +155,13 @@ class Log:
         )
 
 
+def excited_part(log: Log, most: int) -> Log:
+    """At most so many samples of a log, from where its command first changes: before that, many a log is at rest."""
+    changes = np.flatnonzero(np.diff(log.command))
+    first = min(int(changes[0]) if len(changes) else 0, max(len(log) - most, 0))
+    return log.part(first, first + most)
+
+
 def apart(names: Sequence[str]) -> list[str]:
     """The names, numbered where they repeat, so that no two are the same: `log (1)`, `log (2)`."""
     found: list[str] = []
