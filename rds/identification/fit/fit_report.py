@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from base64 import b64encode
 from collections.abc import Sequence
-from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rds.core.atomic import write_files
 from rds.identification.fit.estimate_json import correlation_rows, described, error_rows, note, parameter_rows, to_json
@@ -37,7 +36,7 @@ def write_fit(folder: Path, estimate: Estimate, logs: Sequence[Log], structure: 
             pictures.append(_Drawn(f"bode-{number}.png", f"{log.name}: frequency response", "Bode diagram", bode))
     files = {PAGE: _page(estimate, pictures).encode(), NUMBERS: json.dumps(to_json(estimate), indent=2).encode()}
     files |= {picture.file: picture.png for picture in pictures}
-    write_files({folder / name: partial(_fill, data) for name, data in files.items()})
+    write_files({folder / name: data for name, data in files.items()})
     return [folder / name for name in files]
 
 
@@ -55,10 +54,6 @@ def _bode(estimate: Estimate, log: Log, structure: Structure) -> Picture:
     is_rate = structure.is_rate
     response = frequency_response(log, is_rate, estimate.details["period"])
     return bode_picture(response, estimate.values(), is_rate, estimate.parameters["K"].unit)
-
-
-def _fill(data: bytes, stream: BinaryIO) -> None:
-    stream.write(data)
 
 
 def free_run_picture(estimate: Estimate, log: Log, structure: Structure) -> Picture:
