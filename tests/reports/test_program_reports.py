@@ -113,8 +113,9 @@ def test_a_face_is_the_lowest_that_the_tool_went(tmp_path: Path) -> None:
     assert table.column("readings") == [10, None]
     assert table.column("largest relative error [mm]") == pytest.approx([0.04, 0.126])
     assert table.column("slope in y [mm/m]")[0] == pytest.approx(8.0)
-    with pytest.raises(InputError, match="can be shown; take more"):
-        make_report("flatness", files(tmp_path, path, rows), {"grid": 0.05})
+    for grid in (0.05, 1e-9):
+        with pytest.raises(InputError, match="can be shown; take more"):
+            make_report("flatness", files(tmp_path, path, rows), {"grid": grid})
     with pytest.raises(InputError, match="no level feed moves"):
         make_report("flatness", files(tmp_path, [[0, 2, 0, -1, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0]], rows[:2]))
 

@@ -114,11 +114,10 @@ def _cut_faces(files: Sequence[Path], settings: Mapping[str, Any]) -> list[Face]
         )
     lowest = min(each.start[2] for each in level)
     corners = np.concatenate([_extent(each) for each in level if each.start[2] == lowest])
-    axes = [
-        np.arange(low, high + 1e-9, settings["grid"]) for low, high in zip(corners.min(0), corners.max(0), strict=True)
-    ]
-    if (count := len(axes[0]) * len(axes[1])) > _MOST:
-        raise InputError(f"grid = {settings['grid']:g} mm makes {count} readings, and {_MOST} can be shown; take more")
+    low, high, grid = corners.min(0), corners.max(0), settings["grid"]
+    if (count := float(np.prod(np.floor((high - low) / grid) + 1.0))) > _MOST:
+        raise InputError(f"grid = {grid:g} mm makes {count:.6g} readings, and {_MOST} can be shown; take more")
+    axes = (np.arange(begin, end + 1e-9, grid) for begin, end in zip(low, high, strict=True))
     places = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
     return [_face(run.name, _left(run, path, places, 0.5 * settings["tool"]), files[0]) for run in runs]
 
@@ -143,7 +142,7 @@ def _left(run: Readings, path: Sequence[Segment], places: np.ndarray, radius: fl
             found.append([*place, tool[over, 2].min()])
     if len(found) < _LEAST:
         raise InputError(
-            f"{run.name}: {len(found)} places of the grid were cut, and a face needs {_LEAST}; a finer grid"
+            f"{run.name}: {len(found)} places of the grid were cut, and a face needs {_LEAST}; take a finer grid"
         )
     return np.array(found)
 
