@@ -59,9 +59,10 @@ def test_a_search_leaves_a_bound_at_which_it_only_stands_still() -> None:
 
 
 def test_a_hint_ends_no_fit() -> None:
-    """The step comes after the part on which other options are tried."""
+    """The motion comes after the part on which other options are tried, from a pulse on that moves nothing."""
     u = np.concatenate([np.zeros(12_000), square(4.0)])
     swaying = moved(u) + 0.05 * (u != 0.0) * np.sin(2 * np.pi * 0.3 * np.arange(len(u)) * T)  # what no structure has
+    u[1] = 0.01
     late = log(u, np.rint(swaying / STEP) * STEP)
     estimate = fit([late], AXIS)
     with pytest.raises(InputError):
