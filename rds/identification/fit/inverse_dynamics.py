@@ -24,7 +24,7 @@ from rds.core.quantities import Quantity
 from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.made_estimate import made_estimate
 from rds.identification.fit.regression import Regression, regress
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, check_regular
 from rds.identification.structures.motion_form import MotionForm, motion_form
 from rds.identification.structures.structure import Structure
 
@@ -46,7 +46,6 @@ OPTIONS = {
         "samples left out at each end; 4.9 sampling frequencies over the cut-off if not given", low=0.0, whole=True
     ),
 }
-_JITTER = 0.1  # of a sample period: how far a time may be off the regular grid
 _REST = 2  # decimated samples within which an axis at rest moves no more than one step of its encoder
 _LEAST = 5  # rows for each coefficient
 
@@ -231,14 +230,7 @@ def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[
         from scipy.signal import butter, decimate, filtfilt
 
     T = log.sample_period
-    off = np.abs(log.time - log.time[0] - T * np.arange(len(log)))
-    if off.max() > _JITTER * T:
-        at = int(np.argmax(off > _JITTER * T))
-        raise InputError(
-            f"at sample {at}, t = {log.time[at]:g} s is {off[at] / T:.2g} sample periods off a regular grid; filters "
-            "need regular times: take --method simulation, which uses times as they are, or resample the log",
-            log.source or log.name,
-        )
+    check_regular(log, "a filter")
     least = 2 * settings.drop + 4 * settings.decimation * len(form.names)
     if len(log) < max(least, 40):
         raise InputError(

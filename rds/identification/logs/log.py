@@ -16,6 +16,7 @@ from rds.core.quantities import Quantity
 
 # what a column can be, beside time
 QUANTITIES = ("command", "position", "velocity", "current", "force", "reference", "following_error")
+_JITTER = 0.1  # of a sample period: how far a time may be off where a grid is needed
 RATES = ("rev/min", "mm/s")  # units of a position that is a speed: of a spindle, or of a log without a position
 
 
@@ -152,6 +153,19 @@ class Log:
             command=self.command[chosen],
             position=self.position[chosen],
             extra={key: values[chosen] for key, values in self.extra.items()},
+        )
+
+
+def check_regular(log: Log, what: str) -> None:
+    """InputError where a time is more than a tenth of a sample period off a regular grid, which `what` needs."""
+    T = log.sample_period
+    off = np.abs(log.time - log.time[0] - T * np.arange(len(log))) / T
+    if off.max() > _JITTER:
+        at = int(np.argmax(off > _JITTER))
+        raise InputError(
+            f"at sample {at}, t = {log.time[at]:g} s is {off[at]:.2g} sample periods off a regular grid, which {what} "
+            "needs; take --method simulation, which uses times as they are, or resample the log",
+            log.source or log.name,
         )
 
 
