@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,14 +70,14 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
         [path.name for path in files],
         settings,
         tables,
-        {f"Current of {name}": _drawing(name, records, starting, idle) for name in names},
+        {
+            f"Current of {name}": partial(
+                picture, [record for record in records if record.source == name], starting, idle
+            )
+            for name in names
+        },
         _findings(records, starting, idle),
     )
-
-
-def _drawing(name: str, records: Sequence[Current], starting: int, idle: int) -> Any:
-    mine = [record for record in records if record.source == name]
-    return lambda: picture(mine, starting, idle)
 
 
 def _read(path: Path, source: str, settings: Mapping[str, Any]) -> list[Current]:

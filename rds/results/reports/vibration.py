@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,13 +75,9 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
         [path.name for path in files],
         settings,
         tables,
-        {f"Acceleration of {record.name}": _drawing(record, settings) for record in records},
+        {f"Acceleration of {record.name}": partial(picture, record, settings) for record in records},
         _findings(records, settings),
     )
-
-
-def _drawing(record: Vibration, settings: Mapping[str, Any]) -> Any:
-    return lambda: picture(record, settings)
 
 
 def _read(path: Path, name: str, settings: Mapping[str, Any]) -> Vibration:
