@@ -144,6 +144,21 @@ def test_derivatives_are_integrated_as_coarsely_as_the_noise_allows(tmp_path: Pa
         assert abs(found[name].value - X[name]) < 4.0 * found[name].std_error
 
 
+def test_a_model_that_refuses_a_value_is_told_with_it(tmp_path: Path) -> None:
+    path = tmp_path / "picky.py"
+    path.write_text(
+        'params = {"tau": 0.012, "K": 1.0}\n'
+        "def derivatives(t, x, u, params):\n"
+        '    if params["K"] > 1.2:\n'
+        '        raise ValueError("too strong")\n'
+        '    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]\n'
+    )
+    with pytest.raises(
+        InputError, match=r"the model fails with tau = .*, K = .*too strong.*; correct it, or give bounds"
+    ):
+        fit([axis_log(FREE, seconds=0.2)], structure(path))
+
+
 def test_how_coarsely_is_not_told_by_an_axis_at_rest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(student_structure, "_TRIED", 100)
     path = tmp_path / "stiff.py"

@@ -56,12 +56,13 @@ def _structure(student: StudentFile, path: str | Path, substeps: int) -> Structu
         )
     bounds = _bounds(student, begun, where)
     units = _table(student, "units", begun, where)
-    model = student_model(student)
+    model = student_model(student, substeps=substeps)
+    simulated = structure_of_model(model).respond
     states = len(model.initial_state)
 
     def respond(t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float]) -> np.ndarray:
         try:
-            return structure_of_model(student_model(student, values, substeps)).respond(t, u, x0, {})
+            return simulated(t, u, x0, values)
         except InputError:
             raise
         except STUDENT_ERRORS as error:
