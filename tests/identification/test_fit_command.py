@@ -138,8 +138,10 @@ def test_derivatives_are_integrated_as_coarsely_as_the_noise_allows(tmp_path: Pa
         "def derivatives(t, x, u, params):\n"
         '    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]\n'
     )
-    log = axis_log(FREE, seconds=0.6)
-    found = fit([log], structure(path)).parameters
+    log = replace(axis_log(FREE, seconds=0.6), units={"position": "deg", "command": "A"})
+    estimate = fit([log], structure(path))
+    assert (estimate.output_unit, estimate.command_unit) == ("deg", "A")  # those of the log, as for any structure
+    found = estimate.parameters
     for name in ("tau", "K"):
         assert abs(found[name].value - X[name]) < 4.0 * found[name].std_error
 

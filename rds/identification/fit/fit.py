@@ -58,7 +58,9 @@ def fit(
             named[0].source or named[0].name,
         )
     named, options = _with_gain(named, structure, dict(options or {}))
-    structure = structure.prepare(named) if structure.prepare else structure
+    if structure.prepare:
+        output, command = structure.output_unit, structure.command_unit  # of the logs, whatever is prepared
+        structure = replace(structure.prepare(named), output_unit=output, command_unit=command)
     estimated: Estimate = METHODS.module(method or structure.default_method).estimate(named, structure, options)
     if estimated.relative_error_percent is None:
         estimated = replace(estimated, relative_error_percent=voltage_error_percent(named, structure, estimated))
