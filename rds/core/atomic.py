@@ -14,8 +14,9 @@ from rds.core.private_files import make_folder, open_private
 _HEAD = 2000  # bytes
 
 
-def write_files(writers: Mapping[Path, Callable[[BinaryIO], None]]) -> None:
-    """Let each writer fill the file at its path; the files appear complete, together, or not at all.
+def write_files(contents: Mapping[Path, bytes | Callable[[BinaryIO], None]]) -> None:
+    """Write bytes to their paths, or let a writer fill the file there; the files appear complete, together, or not at
+    all.
 
     Each is written to a temporary file beside its place and synced; only when all are on disk do they take
     their names. A failure or a kill before that leaves what was there before. Missing directories are made.
@@ -24,12 +25,15 @@ def write_files(writers: Mapping[Path, Callable[[BinaryIO], None]]) -> None:
     staged: dict[Path, Path] = {}
     path = Path()
     try:
-        for path, write in writers.items():
+        for path, content in contents.items():
             make_folder(path.parent)
             temporary = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
             with cast(BinaryIO, open_private(temporary, "xb")) as stream:
                 staged[path] = temporary
-                write(stream)
+                if isinstance(content, bytes):
+                    stream.write(content)
+                else:
+                    content(stream)
                 stream.flush()
                 os.fsync(stream.fileno())
         for path, temporary in staged.items():
@@ -47,11 +51,7 @@ def write_files(writers: Mapping[Path, Callable[[BinaryIO], None]]) -> None:
 
 def write_whole(path: Path, data: bytes) -> Path:
     """Write one file so that it appears complete or not at all; see `write_files`. Returns its path."""
-
-    def write(stream: BinaryIO) -> None:
-        stream.write(data)
-
-    write_files({path: write})
+    write_files({path: data})
     return path
 
 

@@ -160,7 +160,7 @@ def _layout(path: Path) -> tuple[list[str], str, str, bool]:
     Spreadsheets of many countries write `;` between cells and `,` as the decimal point.
     """
     with open(path, "rb") as stream:
-        first, second = stream.readline(65536), stream.readline(65536)
+        first, below = stream.readline(65536), stream.read(65536)
     try:
         head = first.removeprefix(codecs.BOM_UTF8).decode("utf-8").rstrip("\r\n")
     except UnicodeDecodeError as error:
@@ -168,9 +168,9 @@ def _layout(path: Path) -> tuple[list[str], str, str, bool]:
     if not head.strip() or "\0" in head:
         raise InputError("it is not a table: its first line must head the columns, as in 'time [s],X_measured [mm]'")
     delimiter = max(",;\t", key=head.count)
-    decimal = "," if delimiter != "," and b"," in second else "."
+    decimal = "," if delimiter != "," and b"," in below else "."
     try:
         names = [name.strip() for name in next(csv.reader([head], delimiter=delimiter))]
     except csv.Error as error:
         raise InputError(f"it is not a table: its first line cannot be read ({error})") from error
-    return names, delimiter, decimal, not second.strip()
+    return names, delimiter, decimal, not below.strip()

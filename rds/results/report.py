@@ -7,11 +7,11 @@ from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from rds.core import drawing
-from rds.core.atomic import write_files
+from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.results import html
 from rds.results.metrics import ERROR_METRICS, axis_metrics, metric_units
@@ -53,12 +53,7 @@ def write_report(
     """
     path = Path(path)
     text = report(title, results, tables, notes, [_link(path, file) for file in files], sections, pictures)
-
-    def write(stream: BinaryIO) -> None:
-        stream.write(text.encode("utf-8", "backslashreplace"))
-
-    write_files({path: write})
-    return path
+    return write_whole(path, text.encode("utf-8", "backslashreplace"))
 
 
 def report(

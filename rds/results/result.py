@@ -213,12 +213,8 @@ def _check_columns(columns: Mapping[str, np.ndarray]) -> None:
     if not (steps > 0).all():
         row = int(np.flatnonzero(~(steps > 0))[0]) + 1
         raise InputError(
-            f"time does not increase at sample {row}: {columns['time'][row - 1]} s, then " + _at(columns, row)
+            f"time does not increase at sample {row}: {columns['time'][row - 1]} s, then {columns['time'][row]} s"
         )
-
-
-def _at(columns: Mapping[str, np.ndarray], row: int) -> str:
-    return f"{columns['time'][row]} s"
 
 
 def _check_meta(meta: Mapping[str, Any]) -> None:

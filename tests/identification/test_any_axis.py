@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
+from rds.identification.fit.design import left_out_of, linear_axis_of
 from rds.identification.fit.fit import fit
-from rds.identification.fit.friction_curve import friction_curve
+from rds.identification.fit.friction_curve import SteadyPoint, _fitted, friction_curve
 from rds.identification.fit.machine_file import write_machine
 from rds.identification.fit.model_file import read_model, write_model
 from rds.identification.fit.run_model import run_model
@@ -222,6 +223,17 @@ def test_a_friction_curve_from_runs_at_constant_speed() -> None:
     )
 
 
+def test_the_errors_of_a_friction_curve_count_that_all_four_numbers_are_estimated() -> None:
+    draw, v = np.random.default_rng(1), np.array([0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0, 20.0, 40.0])
+    beyond = 0
+    for _ in range(60):
+        f = 8.0 + 4.0 * np.exp(-((v / 3.0) ** 2)) + 0.2 * v + 0.1 * draw.standard_normal(len(v))
+        points = [SteadyPoint("runs", 0.0, 1.0, *map(float, at), 0.1) for at in zip(v, f, strict=True)]
+        numbers, _ = _fitted(points, 1.0, "mm/s", "N", "mm/s")
+        beyond += abs(numbers["F_c"].value - 8.0) > 2.45 * numbers["F_c"].std_error  # Student's t of 6: 5 %
+    assert beyond <= 6
+
+
 def test_what_a_friction_curve_cannot_tell() -> None:
     fast = friction_curve([steady([20.0, 25.0, 30.0, 36.0, 44.0, 53.0, 65.0], noise=0.05)])
     assert set(fast.directions["forward"]) == {"F_c", "F_v"}
@@ -247,6 +259,12 @@ def test_a_friction_curve_names_the_logs_that_gave_no_point() -> None:
     assert any(sentence.startswith("slow: no stretch of these logs") for sentence in found.unidentifiable)
 
 
+def test_a_design_says_what_it_leaves_out_of_one_direction() -> None:
+    both = left_out_of({"friction_plus": 0.5, "friction_minus": -0.5, "viscous_plus": 0.1})
+    assert left_out_of({"friction_plus": 0.0, "friction_minus": -0.5, "viscous_difference": 0.1}) == both
+    assert len(both) == 2
+
+
 def test_a_torque_against_the_motion_is_a_fault() -> None:
     log = turning(1)
     assert not any(f.kind == "sign" for f in with_findings(log).findings)
@@ -265,6 +283,7 @@ def test_a_log_of_a_speed_is_fitted_with_friction_of_each_direction_and_refused_
     for name, value in truth.items():
         assert found.parameters[name].value == pytest.approx(value, rel=0.01), name
         assert abs(found.parameters[name].value - value) < 4.0 * found.parameters[name].std_error
+    assert linear_axis_of(found).unit == "mm"  # of the position, whose speed it was
     with pytest.raises(InputError, match="takes positions, and the log has a speed alone"):
         fit([log], structure("axis"), "step")
     with pytest.raises(InputError, match="play shows in a position"):

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from rds.core.quantities import Quantity
 from rds.identification.fit.fit import fit
+from rds.identification.fit.problem import Problem
+from rds.identification.fit.profile import widening
 from rds.identification.logs.log import Log
 from rds.identification.structures.axis_structure import make
+from rds.identification.structures.structure import Structure
 from tests.identification.fit_logs import mini_cnc
 
 AXIS = make()
@@ -23,6 +28,19 @@ def creeping(seed: int, kind: str, share: float) -> Log:
     u = np.abs(u).max() * np.sign(u) if kind == "square" else u
     y = AXIS.respond(t, u, (0.0, 0.0), values)
     return Log(kind, t, u, y + np.ptp(y) / 40.0 * draw.standard_normal(len(t)), units={"position": "mm"})
+
+
+def test_a_profile_is_followed_to_the_bound_that_a_parameter_cannot_pass() -> None:
+    def respond(t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float]) -> np.ndarray:
+        return x0[0] + values["a"] * u
+
+    made = Structure("line", {"a": Quantity("slope", low=0.25)}, {"a": ""}, 1, respond, at_most={"a": 1.05})
+    t = np.arange(100.0)
+    u = t - t.mean()
+    problem = Problem([Log("line", t, u, u)], made, {})
+    allowed = (1.0 - 0.3) ** 2 * float(u @ u)  # of a slope of 0.3: the true end of the interval, near the bound
+    widened = widening(problem, np.array([1.0, 0.0]), 0.0, {"a": 0.1}, allowed)
+    assert widened["a"] == pytest.approx(7.0, abs=0.5)
 
 
 @pytest.mark.parametrize("kind", ["square", "sine"])

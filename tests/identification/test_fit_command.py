@@ -15,6 +15,7 @@ from rds.core.errors import InputError
 from rds.identification.fit.fit import fit
 from rds.identification.fit.model_file import read_model
 from rds.identification.logs.log import Log
+from rds.identification.structures import student_structure
 from rds.identification.structures.structures import structure
 from tests.identification.fit_logs import axis_log, mini_cnc
 
@@ -69,12 +70,15 @@ def test_split_validates_on_what_was_not_fitted(tmp_path: Path) -> None:
 
 
 def test_the_report_is_a_page_with_a_picture_for_each_log(tmp_path: Path) -> None:
-    logs = [csv(tmp_path / f"{seed}.csv", axis_log(X, seed=seed, seconds=2.0)) for seed in (1, 2)]
+    logs = []
+    for seed in (1, 2):  # files of one name in two folders
+        (tmp_path / str(seed)).mkdir()
+        logs.append(csv(tmp_path / str(seed) / "x.csv", axis_log(X, seed=seed, seconds=2.0)))
     code, out, _ = run(*logs, "--structure", "axis", "--report", tmp_path / "page")
     assert code == 0
     assert "friction_minus" in out and "free run" in out and "100 ahead" in out
     page = (tmp_path / "page" / "fit.html").read_text()
-    assert page.count("<img") == 2 and "To doubt" in page
+    assert page.count("<img") == 2 and "To doubt" in page and "<h2>x (1)</h2>" in page and "<h2>x (2)</h2>" in page
     assert sorted(path.name for path in (tmp_path / "page").glob("*.png")) == ["fit-1.png", "fit-2.png"]
 
 
@@ -134,10 +138,43 @@ def test_derivatives_are_integrated_as_coarsely_as_the_noise_allows(tmp_path: Pa
         "def derivatives(t, x, u, params):\n"
         '    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]\n'
     )
-    log = axis_log(FREE, seconds=0.6)
-    found = fit([log], structure(path)).parameters
+    log = replace(axis_log(FREE, seconds=0.6), units={"position": "deg", "command": "A"})
+    estimate = fit([log], structure(path))
+    assert (estimate.output_unit, estimate.command_unit) == ("deg", "A")  # those of the log, as for any structure
+    found = estimate.parameters
     for name in ("tau", "K"):
         assert abs(found[name].value - X[name]) < 4.0 * found[name].std_error
+
+
+def test_a_model_that_refuses_a_value_is_told_with_it(tmp_path: Path) -> None:
+    path = tmp_path / "picky.py"
+    path.write_text(
+        'params = {"tau": 0.012, "K": 1.0}\n'
+        "def derivatives(t, x, u, params):\n"
+        '    if params["K"] > 1.2:\n'
+        '        raise ValueError("too strong")\n'
+        '    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]\n'
+    )
+    with pytest.raises(
+        InputError, match=r"the model fails with tau = .*, K = .*too strong.*; correct it, or give bounds"
+    ):
+        fit([axis_log(FREE, seconds=0.2)], structure(path))
+
+
+def test_how_coarsely_is_not_told_by_an_axis_at_rest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(student_structure, "_TRIED", 100)
+    path = tmp_path / "stiff.py"
+    path.write_text(
+        'params = {"tau": 0.0003, "K": 1.5}\n'
+        "def derivatives(t, x, u, params):\n"
+        '    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]\n'
+    )
+    log = axis_log(FREE, seconds=0.3)
+    log = replace(log, command=np.where(log.time < 0.15, 0.0, log.command))
+    made = structure(path)
+    assert made.prepare is not None
+    begun = {"tau": 0.0003, "K": 1.5}  # one Runge-Kutta step in a sample is unstable
+    assert np.abs(made.prepare([log]).respond(log.time, log.command, (0.0, 0.0), begun)).max() < 10.0  # mm
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rds.core.errors import InputError
+from rds.identification.fit import starting_values
+from rds.identification.fit.estimate import Errors
 from rds.identification.fit.fit import fit
 from rds.identification.logs.log import Log
 from rds.identification.structures.axis_structure import make
@@ -129,6 +133,22 @@ def test_two_logs_tell_more_than_one_and_each_has_its_own_initial_state() -> Non
         assert both.initial_state[log.name][0] == pytest.approx(log.position[0], abs=0.005)
 
 
+def test_a_log_that_begins_with_a_long_rest_is_fitted_by_what_comes_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(starting_values, "MOST_SAMPLES", 1000)
+    truth = mini_cnc("X")
+    log = axis_log(truth, seconds=2.0)
+    before = np.zeros(1500)
+    log = Log(
+        "rests first",
+        np.arange(3500) * 0.001,
+        np.concatenate([before, log.command]),
+        np.concatenate([before + log.position[0], log.position]),
+        resolution=log.resolution,
+    )
+    for name, parameter in fit([log], make()).parameters.items():
+        assert abs(parameter.value - truth[name]) < 4.0 * parameter.std_error, name
+
+
 def test_irregular_times_are_used_as_they_are() -> None:
     draw, values = np.random.default_rng(5), mini_cnc("X")
     times = np.cumsum(draw.uniform(0.0004, 0.0021, 6000))
@@ -157,6 +177,10 @@ def test_predictions_stand_beside_the_free_run() -> None:
     # the noise of two samples is in a prediction that starts from a measurement
     assert found.ahead[log.name][10].rmse == pytest.approx(np.sqrt(2.0) * found.free_run[log.name].rmse, rel=0.05)
     assert found.relative_error_percent is not None and found.relative_error_percent < 10.0
+    for of_rest in (("rest", log.name), (log.name, "rest")):  # an axis at rest has no fit, wherever its log stands
+        runs = {"rest": Errors(np.nan, 0.0, 0.0, "mm"), **found.free_run}
+        both = replace(found, free_run={name: runs[name] for name in of_rest}, logs=found.logs * 2)
+        assert both.to_json()["fit_percent"] == found.free_run[log.name].fit_percent
 
 
 @pytest.mark.parametrize(
@@ -165,6 +189,7 @@ def test_predictions_stand_beside_the_free_run() -> None:
         ({"fixed": {"taw": 1.0}}, "did you mean 'tau'"),
         ({"fixed": {"tau": -1.0}}, "must be more than 0"),
         ({"fixed": {"friction_minus": 0.5}}, "must be at most 0"),
+        ({"fixed": {"K": 1.7}, "start": {"K": 2.0}}, r"K is held at 1\.7, so no search begins at 2; leave"),
         ({"speed": 1}, "has no option 'speed'"),
     ],
 )

@@ -16,6 +16,8 @@ from rds.identification.fit.missing_options import missing_option, with_hint
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.search import stands_at_bound
 from rds.identification.fit.solve import least_squares
+from rds.identification.fit.uncertainty import Uncertainty
+from rds.identification.fit.unidentifiable import unidentifiable_by
 from rds.identification.structures.structures import structure
 from tests.validation.validation_logs import STEP, T, X, log, moved, square
 
@@ -57,11 +59,22 @@ def test_a_search_leaves_a_bound_at_which_it_only_stands_still() -> None:
 
 
 def test_a_hint_ends_no_fit() -> None:
-    """The step comes after the part on which other options are tried."""
+    """The motion comes after the part on which other options are tried, from a pulse on that moves nothing."""
     u = np.concatenate([np.zeros(12_000), square(4.0)])
     swaying = moved(u) + 0.05 * (u != 0.0) * np.sin(2 * np.pi * 0.3 * np.arange(len(u)) * T)  # what no structure has
+    u[1] = 0.01
     late = log(u, np.rint(swaying / STEP) * STEP)
     estimate = fit([late], AXIS)
     with pytest.raises(InputError):
         missing_option(estimate, [late])
     assert with_hint(estimate, [late]) == estimate
+
+
+@pytest.mark.parametrize(("second", "word"), [(1.0, "ratio"), (-1.0, "product")])
+def test_two_that_come_only_together_are_told_with_what_is_known_of_them(second: float, word: str) -> None:
+    made = structure("axis")
+    values = dict.fromkeys(made.parameters, 1.0)
+    names, change = list(values), np.array([1.0, second, 0.0, 0.0])
+    told = Uncertainty(np.eye(4) * 1e-6, (), (change,), 1, 100.0, 0.1)
+    (sentence,) = unidentifiable_by(made, names, values, told)
+    assert sentence == f"tau and K come only as their {word}: these data cannot tell them apart"

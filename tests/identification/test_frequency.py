@@ -157,6 +157,9 @@ def test_what_it_cannot_do_is_refused_with_a_remedy() -> None:
     log = axis_log(ONE_WAY, seconds=6.0)
     with pytest.raises(InputError, match="excites no frequency"):
         fit([replace(log, command=np.full(len(log), 2.0))], structure("axis"), "frequency")
+    with pytest.raises(InputError, match=r"excites no frequency up to 400 Hz .* such as a multisine"):
+        turns = np.where(np.arange(len(log)) % 2, 1.0, -1.0)  # each sample
+        fit([replace(log, command=turns)], structure("axis"), "frequency")
     with pytest.raises(InputError, match="never changes"):
         fit([replace(log, position=np.zeros(len(log)))], structure("axis"), "frequency")
     with pytest.raises(InputError, match="multisine or a chirp"):

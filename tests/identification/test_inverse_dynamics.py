@@ -187,6 +187,12 @@ def test_what_it_cannot_do_is_refused_with_a_remedy() -> None:
         fit([log], structure("axis"), inverse, {"cutof": 10.0})
     with pytest.raises(InputError, match="half the sampling frequency"):
         fit([log], structure("axis"), inverse, {"cutoff": 600.0})
+    slow = replace(log, time=10.0 * log.time, name="slow")
+    with pytest.raises(InputError, match="half the sampling frequency, 50 Hz"):
+        fit([log, slow], structure("axis"), inverse, {"cutoff": 80.0})
+    for option, value, sentence in (("decimation", 2.5, "a whole number"), ("hold", 1.5, "from 0 to 1")):
+        with pytest.raises(InputError, match=f"{option} = {value} must be {sentence}"):
+            fit([log], structure("axis"), inverse, {option: value})
     with pytest.raises(InputError, match=r"at rest.*--set decimation=1"):
         fit([simulated(np.zeros(2000), noise=0.0)], structure("axis"), inverse)
     with pytest.raises(InputError, match=r"samples, and this filter needs .*--set cutoff=HZ"):

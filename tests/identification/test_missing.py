@@ -36,7 +36,7 @@ def test_the_option_that_is_missing_is_named(added: dict[str, float]) -> None:
     estimate = fit([log], structure("axis"))
     hint = missing_option(estimate, [log])
     (name,) = added
-    assert hint is not None and hint.startswith(f"try --option {name}: over the first 2000 samples it would leave ")
+    assert hint is not None and hint.startswith(f"try --option {name}: over 2000 samples it would leave ")
     assert with_hint(estimate, [log]).warnings == (*estimate.warnings, hint)
     assert missing_option(fit([log], structure("axis", [name])), [log]) is None  # nothing is left to be explained
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis.strategies import floats, integers
 
 from rds.core.errors import InputError
+from rds.identification.logs.log import Log
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import structure
 from rds.models import linear_axis, spindle
@@ -96,6 +99,18 @@ def test_the_spindle_is_that_of_the_library() -> None:
         if k + 1 < len(t):
             x = spindle.advance(x, u[k], t[k + 1] - time, spindle.make(**values).params)
     assert np.abs(structure("spindle").respond(t, u, (10.0,), values) - expected).max() < 1e-9
+
+
+def test_a_spindle_s_steady_speed_is_no_fault_beside_steps() -> None:
+    values = {"tau": 0.08, "K": 1000.0}
+    t, u = np.arange(600) * 1e-3, np.where(np.arange(600) < 100, 1.0, 2.0)
+    steps = Log("steps", t, u, structure("spindle").respond(t, u, (1000.0,), values), units={"position": "rev/min"})
+    steady = replace(steps, name="steady", command=np.full(600, 1.5), position=np.full(600, 1500.0))
+    start = structure("spindle").start
+    assert start is not None
+    assert next(iter(start([steady, steps])))[0] == pytest.approx(values, rel=1e-3)
+    with pytest.raises(InputError, match="the command never changes"):
+        start([steady, steady])
 
 
 def test_without_viscous_friction_the_mass_accelerates_evenly() -> None:

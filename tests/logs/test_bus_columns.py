@@ -14,7 +14,7 @@ from rds.core.errors import InputError
 from rds.identification.logs.describe import describe
 from rds.identification.logs.log import Gravity, Log
 from rds.identification.logs.read_log import read_log
-from tests.logs.data_files import axis
+from tests.logs.data_files import axis, write
 from tests.logs.test_formats import DBC
 
 MAP = """
@@ -194,3 +194,19 @@ def test_two_channels_of_a_recorder_are_never_one_column(
     else:
         with pytest.raises(InputError, match=r"Drive\.Voltage \(0x100\) was received on two channels"):
             read_log(tmp_path / name)
+
+
+def test_a_bus_log_is_a_second_file_whose_offset_is_stated(tmp_path: Path) -> None:
+    logged(tmp_path, frames())
+    made = axis(200)
+    write(tmp_path / "host.csv", {"time [s]": made["time"] + 0.5, "u [V]": made["voltage"]})
+    (tmp_path / "host.csv.map.toml").write_text("""
+time = { column = "time" }
+bus = { dbc = "a.dbc" }
+second = { file = "bus.log", offset = 0.5, drift = 1e-6 }
+[axis.X]
+command = "u"
+position = { column = "Encoder.Position", second = true }
+""")
+    (log,) = read_log(tmp_path / "host.csv")
+    assert len(log) >= 198 and abs(log.time[0] - 0.5) < 2e-3

@@ -66,6 +66,8 @@ def test_motions_that_are_not_one_are_refused() -> None:
         align(t, random.normal(size=len(t)), t, random.normal(size=len(t)))
     with pytest.raises(InputError, match="is constant"):
         align(t, np.ones_like(t), t, random.normal(size=len(t)))
+    with pytest.raises(InputError, match="the second file's column for the alignment holds no numbers"):
+        align(t, random.normal(size=len(t)), t[:0], t[:0])
 
 
 def test_resampling_states_its_error_and_keeps_it() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import rds
+from rds.identification.logs.log import apart
 
 UNITS = {"command": "V", "position": "mm"}
 TAU, K, T = 0.01, 1.8, 1e-3
@@ -49,3 +50,8 @@ def test_what_is_refused(more: dict[str, Any], units: dict[str, str], said: str)
 def test_a_fit_of_the_object_itself_says_how_it_becomes_a_log() -> None:
     with pytest.raises(rds.InputError, match=r"is no log; rds\.Log\.of\(data, units=\.\.\.\)"):
         rds.fit(data(), "axis")
+
+
+def test_names_that_repeat_are_numbered_as_no_other_is_called() -> None:
+    assert apart(["a", "b"]) == ["a", "b"]
+    assert apart(["a", "a", "a (1)", "b"]) == ["a (2)", "a (3)", "a (1)", "b"]

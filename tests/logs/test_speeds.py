@@ -7,6 +7,7 @@ import pytest
 
 from rds.identification.fit.fit import fit
 from rds.identification.fit.upsets import upsets
+from rds.identification.logs.describe_plot import overview
 from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import Finding, Gravity, Log
 from rds.identification.structures.structures import structure
@@ -172,3 +173,16 @@ def test_a_flywheel_s_gain_at_rest_is_not_told_by_a_log_that_never_comes_to_rest
     }  # the same gain over time constant
     found = as_axis(Candidate("model", made, model), log, 0.3)
     assert found is not None and not (found.gain.at == 0.0 and abs(found.gain.value) > 3.5 * found.gain.error)
+
+
+@pytest.mark.parametrize("unit", ["rev/min", "mm/s"])
+def test_a_speed_tells_its_direction_by_its_sign_and_has_no_end_stop(unit: str) -> None:
+    t, units = np.arange(4000) * 1e-3, {"position": unit, "command": "V"}
+    forward = with_findings(
+        Log("one way", t, 2.0 + np.sin(6.0 * t), np.round(5.0 + 3.0 * np.sin(6.0 * t - 0.3), 2), units=units)
+    )
+    assert any("never moves in the negative direction" in finding.what for finding in said(forward, "excitation"))
+    u = np.where(np.floor(2.0 * t) % 2.0, 5.0, -5.0)
+    limited = with_findings(Log("limited", t, u, np.round(0.6 * u, 2), units=units))
+    assert not any("end stop" in finding.what for finding in limited.findings)
+    assert {axes.get_ylabel() for axes in overview([limited]).axes} >= {f"speed [{unit}]"}

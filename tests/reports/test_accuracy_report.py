@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from thesis_data import COUNTS_A, COUNTS_X, COUNTS_Z, save
 
+from rds.core.errors import InputError
 from rds.results.reports import Report, make_report
 from rds.results.reports.accuracy import Moves, report_on
 
@@ -171,3 +172,10 @@ def test_data_in_mm_and_moves_of_our_own_modules_give_the_same(tmp_path: Path) -
         for row, other in zip(ours.rows, theirs.rows, strict=True):
             assert row[:2] == other[:2]
             assert row[2:] == pytest.approx(other[2:])
+
+
+def test_a_file_of_which_the_table_about_it_says_nothing_names_that_table(tmp_path: Path) -> None:
+    about = tmp_path / "moves.toml"
+    about.write_text("[z]\ndistance = 80.0\ncounts_per_unit = 169\n")
+    with pytest.raises(InputError, match=r"give the options, or give .*moves\.toml a table \[x\] with lines such as"):
+        make_report("accuracy", [save(tmp_path / "x.csv", COUNTS_X)], {"about": str(about)})

@@ -85,6 +85,14 @@ def test_reconfiguration_times_from_events(tmp_path: Path) -> None:
     assert "not ready again at its end, after changes of A" in report.findings[0]
 
 
+def test_events_need_not_be_in_order(tmp_path: Path) -> None:
+    log = tmp_path / "events.csv"
+    log.write_text("time_s,event,module\n9,moving,\n1,removed,Z\n6,added,Z\n7,ready,\n2,moving,\n")
+    report = make_report("reconfiguration", [log])
+    # first change until ready, last change until ready, last module plugged in until moving
+    assert report.table("Reconfiguration time").column("mean [s]") == [6.0, 1.0, 3.0]
+
+
 @pytest.mark.parametrize(
     ("table", "ours", "printed"),
     [
@@ -135,6 +143,15 @@ def test_currents_in_milliamperes_with_a_time_column(tmp_path: Path) -> None:
     report = make_report("current", [log], {"voltage": 10})
     assert report.table("Starting and running").column("starting peak [A]") == [2.0]
     assert report.table("Energy").column("energy [J]") == pytest.approx([10 * 0.25])
+    given = make_report("current", [log], {"voltage": 10, "period": 1.0})  # goes before the column
+    assert given.table("Energy").column("energy [J]") == pytest.approx([10 * 2.5])
+
+
+def test_a_reading_that_is_missing_keeps_its_time(tmp_path: Path) -> None:
+    log = tmp_path / "c.csv"
+    log.write_text("cw_A,ccw_A\n2,2\n2,\n2,2\n")
+    energy = make_report("current", [log], {"voltage": 10, "period": 1.0, "starting": 0}).table("Energy")
+    assert energy.column("length [s]") == [2.0, 2.0] and energy.column("energy [J]") == [40.0, 40.0]
 
 
 def test_table_19_takes_its_rest_and_its_extremes_from_different_tests(tmp_path: Path) -> None:
@@ -196,3 +213,14 @@ def test_a_modules_record_of_acceleration_and_current_serves_both_reports(tmp_pa
     path.write_text("time [s],T_current [A]\n0,1\n1,1\n")
     with pytest.raises(InputError, match="'T_current \\[A\\]' is in 'A'; readings of an accelerometer are in adc or g"):
         make_report("vibration", [path])
+
+
+def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
+    files = [tmp_path / trial / "c.csv" for trial in ("first", "second")]
+    for file in files:
+        file.parent.mkdir()
+        save(file, CURRENT_X)
+    report = make_report("current", files)
+    assert list(report.figures) == [f"Current of {tmp_path.as_posix()}/{trial}/c" for trial in ("first", "second")]
+    rows = report.table("Starting and running").column("current")
+    assert len(set(rows)) == 4 and rows[0] == f"{tmp_path.as_posix()}/first/c cw"

@@ -54,6 +54,10 @@ def test_a_corner_is_overshot_or_cut(tmp_path: Path) -> None:
     assert corners.column("cut off [µm]") == pytest.approx([50.0])
     assert report.table("Path error").column("largest [µm]") == pytest.approx([10.0, 30.0])
     assert report.findings == ["A: 30.0 µm at most, in line 6."]
+    path[1][1] = 5  # both of one line, as in a loop of the program
+    rows[1][2], rows[2][2] = 0.1, 10.0
+    report = make_report("path-error", files(tmp_path, path, rows))
+    assert report.findings == ["A: 100.0 µm at most, in line 5."]
 
 
 def test_each_axis_for_itself_leaves_the_line_by_the_formula(tmp_path: Path) -> None:
@@ -109,8 +113,9 @@ def test_a_face_is_the_lowest_that_the_tool_went(tmp_path: Path) -> None:
     assert table.column("readings") == [10, None]
     assert table.column("largest relative error [mm]") == pytest.approx([0.04, 0.126])
     assert table.column("slope in y [mm/m]")[0] == pytest.approx(8.0)
-    with pytest.raises(InputError, match="can be shown; take more"):
-        make_report("flatness", files(tmp_path, path, rows), {"grid": 0.05})
+    for grid in (0.05, 1e-9):
+        with pytest.raises(InputError, match="can be shown; take more"):
+            make_report("flatness", files(tmp_path, path, rows), {"grid": grid})
     with pytest.raises(InputError, match="no level feed moves"):
         make_report("flatness", files(tmp_path, [[0, 2, 0, -1, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0]], rows[:2]))
 

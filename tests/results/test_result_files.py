@@ -258,7 +258,7 @@ def test_hostile_files_execute_nothing(tmp_path: Path, monkeypatch: pytest.Monke
     "text",
     [
         "t,X_measured,note_taken\n0.0,1,7\n0.1,2.5,7\n0.2,3,7\n",
-        "\ufefftime (s);X_measured (mm);x\r\n0,0;1,0;7\r\n0,1;2,5;7\r\n0,2;3;7\r\n",
+        "\ufefftime (s);X_measured (mm);x\r\n0;1;7\r\n0,1;2,5;7\r\n0,2;3;7\r\n",
         "time [s]\tX_measured [mm]\n0\t1\n0.1\t2.5\n0.2\t3",
     ],
     ids=["plain", "spreadsheet", "tabs"],

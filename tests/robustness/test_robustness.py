@@ -267,3 +267,11 @@ def test_ranges_are_checked(tmp_path: Path, text: str, said: str) -> None:
     with pytest.raises(InputError) as caught:
         study(experiment(tmp_path), 5, ranges=tmp_path / "r.toml")
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("ends", [(0.012, 0.009), 0.01, (0.009, float("nan")), ("0.009", "0.012")])
+def test_ranges_of_a_script_are_checked_as_those_of_a_file(tmp_path: Path, ends: Any) -> None:
+    with pytest.raises(
+        InputError, match=r"axis X: the range tau = .* must be (\[lowest, highest\]|finite, lowest first)"
+    ):
+        study(experiment(tmp_path), 5, ranges={"X": {"tau": ends}})

@@ -67,7 +67,11 @@ def test_of_a_long_log_only_the_beginning_is_fitted_and_that_is_said(monkeypatch
     monkeypatch.setattr(attainable, "_LONGEST", 3000)
     found = validate(candidate(share=0.01), log(square()))
     (reason,) = [reason for reason in found.verdict.reasons if reason.kind == "attainable"]
-    assert reason.side is Side.FOR and reason.what.endswith("over the first 3 s)")
+    assert reason.side is Side.FOR and reason.what.endswith("over 3 s of the log)")
+    rests = np.concatenate([np.zeros(4000), square()])  # at first, where nothing tells the gain
+    found = validate(candidate(X | {"K": 1.1 * X["K"]}, share=0.01), log(rests))
+    (reason,) = [reason for reason in found.verdict.reasons if reason.kind == "attainable"]
+    assert reason.side is Side.AGAINST
 
 
 def test_no_fit_is_a_measure_in_a_closed_loop_or_of_a_model_that_was_never_fitted() -> None:

@@ -10,11 +10,14 @@ import pytest
 
 import rds
 from rds.core.errors import InputError
+from rds.core.load import load_student
 from rds.core.types import Model
 from rds.identification.logs.read_log import read_log
+from rds.identification.validate.candidate import as_candidate
 from rds.identification.validate.in_loop import in_loop
 from rds.identification.validate.own_loop import OwnLoop, own_loop
 from rds.identification.validate.validate import validate
+from rds.models.student import student_model
 from rds.results import Result
 from tests.validation.validation_logs import STEP, T, X, candidate, log
 
@@ -37,6 +40,29 @@ def test_a_model_three_times_off_does_not_hide_in_its_own_loop() -> None:
     assert any(r.kind == "loop" and "simulated in the loop itself" in r.what for r in found.verdict.reasons)
     with pytest.raises(InputError, match=r"the experiment has a sample period of 0\.001 s, and the log one of 0\.002"):
         in_loop(right, replace(data, time=2.0 * data.time), simulate)
+    with pytest.raises(InputError, match="the experiment has 4000 samples, and the log begins at its sample 5000"):
+        in_loop(right, replace(data, first=5000), simulate)
+
+
+def test_a_model_is_simulated_as_it_was_given(tmp_path: Path) -> None:
+    run = simulate(rds.library_model("linear-axis", **X))
+    data, given = log(run["X_voltage"], run["X_measured"], closed_loop=True), list[Model]()
+
+    def seen(model: Model) -> Result:
+        given.append(model)
+        return run
+
+    (tmp_path / "own.py").write_text(
+        'params = {"K": 1.0}\ndef derivatives(t, x, u, params):\n    return [x[1], params["K"] * u[0] - x[1]]\n'
+    )
+    own = student_model(load_student(tmp_path / "own.py"), {"K": 2.0})
+    for model in (
+        own,
+        rds.library_model("directional-axis", **X, viscous_plus=0.1),
+        rds.library_model("spindle", tau=0.08, K=1000.0),
+    ):
+        in_loop(as_candidate(model), data, seen)
+        assert given[-1] is model
 
 
 @pytest.mark.parametrize("name", ["pid", "tracking", "cascade"])
@@ -47,6 +73,7 @@ def test_the_loop_of_a_result_is_known_from_the_result(name: str, tmp_path: Path
     known = own_loop(data)
     assert isinstance(known, OwnLoop) and known.late == 0
     assert in_loop(candidate(), data, known.simulate).rmse < 2e-3
+    assert in_loop(candidate(), data.part(1200, 2000), known.simulate).rmse < 2e-3
     if name == "pid":
         found = validate(candidate(X | {"tau": 3.0 * X["tau"]}), data)
         assert any(r.kind == "loop" and r.side == "against" for r in found.verdict.reasons)

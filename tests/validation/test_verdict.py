@@ -17,6 +17,7 @@ from rds.identification.fit.model_file import write_model
 from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.structures.structures import structure
+from rds.identification.validate.alternatives import with_alternatives
 from rds.identification.validate.assessment import assess
 from rds.identification.validate.candidate import as_candidate
 from rds.identification.validate.conclusion import overall
@@ -340,6 +341,8 @@ def test_bands_move_the_verdict_and_unknown_ones_are_refused() -> None:
         Bands.read({"fit": 90.0})
     with pytest.raises(InputError, match="band skill = -1 must be a number of 0 or more"):
         Bands(skill=-1)
+    none = Bands(gain_percent=0.0, phase_degrees=0.0, friction_percent=0.0)
+    assert validate(candidate(), log(FRESH), bands=none).verdict.word is not Word.VALID
 
 
 def test_units_that_differ_are_refused() -> None:
@@ -380,3 +383,12 @@ def test_a_reason_that_logs_share_is_given_once_with_their_names() -> None:
     verdicts = {name: Verdict(Word.PARTLY, name, (shared, own) if name == "a" else (shared,)) for name in "abcdef"}
     given = [reason.what for reason in overall(verdicts).reasons]
     assert given == ["a, b, c, d and 2 more: the fit warned of it", "a: the voltage is 2 % off"]
+
+
+def test_what_the_loop_that_was_logged_says_stands_whatever_the_choice() -> None:
+    model, bands = candidate(X | {"K": 1.028 * X["K"]}), Bands()
+    found = assess(model, log(square(2.0)))
+    more = [Reason(Side.AGAINST, "loop", "simulated in the loop itself, it is off")]
+    verdict = with_alternatives(model, found, judge(model, found, bands, more), bands, more)
+    (note,) = [reason for reason in verdict.reasons if reason.kind == "choice"]
+    assert verdict.word is Word.NOT and "valid" not in note.what  # neither from other samples, nor with other friction

@@ -18,17 +18,24 @@ from rds.core.types import Controller
 from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.model_file import ModelFile, read_model
 from rds.identification.fit.run_model import SPINDLE_UNIT, run_model
+from rds.identification.structures.signals import POSITIONS
 from rds.machines import Machine
 from rds.models.machine_model import MachineAxisMotion, linear_part
 
 LEFT_OUT = {
-    "friction_plus": "Coulomb friction: a tracking error remains that changes with the direction",
+    **dict.fromkeys(
+        ("friction_plus", "friction_minus"),
+        "Coulomb friction: a tracking error remains that changes with the direction",
+    ),
     "stribeck": "Stribeck friction: stick and slip at the lowest speeds",
     "backlash": "play: it leaves an error of up to the play at each reversal, and may bring a limit cycle",
     "dead_zone": "the dead zone of the amplifier, which acts as more friction",
     "offset": "the amplifier's offset: a constant error remains, as there is no integral",
     "delay": "the delay, which takes phase margin",
-    "viscous_plus": "viscous friction that differs by direction: tau and K are those of the mean of both",
+    **dict.fromkeys(
+        ("viscous_plus", "viscous_difference"),
+        "viscous friction that differs by direction: tau and K are those of the mean of both",
+    ),
 }
 
 
@@ -48,7 +55,7 @@ class Linear:
 
 def left_out_of(params: Mapping[str, Any]) -> tuple[str, ...]:
     """Sentences on what an axis with these parameters has, and a design by τ and K does not know of."""
-    return tuple(sentence for name, sentence in LEFT_OUT.items() if params.get(name))
+    return tuple(dict.fromkeys(sentence for name, sentence in LEFT_OUT.items() if params.get(name)))
 
 
 def linear_axis_of(model: Linear | ModelFile | Estimate | str | Path) -> Linear:
@@ -74,6 +81,8 @@ def linear_axis_of(model: Linear | ModelFile | Estimate | str | Path) -> Linear:
     if file.is_student:
         left_out.append(f"whatever {Path(file.structure).name} has beside tau and K")
     name, unit = Path(file.path).name, file.output_unit or "mm"
+    if not file.is_student:
+        unit = POSITIONS[unit][0]  # of a log of speeds, the position that the library's axis has
     return Linear(float(params["tau"]), float(params["K"]), tuple(left_out), name, tuple(file.doubts()), unit)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from math import hypot, isfinite
+from math import hypot, isfinite, isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -123,13 +123,15 @@ def note(estimate: Estimate) -> str:
 
 
 def _overall(estimate: Estimate) -> tuple[float, float]:
-    """Fit and RMSE of the free runs of all logs: the worst fit, and the root mean square over all samples."""
-    fits = [errors.fit_percent for errors in estimate.free_run.values()]
+    """Fit and RMSE of the free runs of all logs: the worst fit that is known (that of a log at rest is not), and the
+    root mean square over all samples.
+    """
+    fits = [errors.fit_percent for errors in estimate.free_run.values() if not isnan(errors.fit_percent)]
     lengths = [log["end"] - log["first"] for log in estimate.logs]
     squares = 0.0
     for errors, length in zip(estimate.free_run.values(), lengths, strict=True):
         squares = hypot(squares, errors.rmse * length**0.5)
-    return min(fits), squares / sum(lengths) ** 0.5
+    return min(fits, default=nan), squares / sum(lengths) ** 0.5
 
 
 def _unit(estimate: Estimate) -> str:

@@ -66,12 +66,8 @@ class Task:
         value = abs(self.values[name])
         if value > 0.0:
             return value
-        same = [abs(v) for other, v in self.values.items() if other != name and v and _units_match(self, name, other)]
-        return max(same, default=1.0)
-
-
-def _units_match(task: Task, name: str, other: str) -> bool:
-    return task.structure.units[name] == task.structure.units[other]
+        units = self.structure.units
+        return max((abs(v) for other, v in self.values.items() if units[other] == units[name]), default=0.0) or 1.0
 
 
 @dataclass(frozen=True)

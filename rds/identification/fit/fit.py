@@ -13,7 +13,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.registry import Registry
 from rds.identification.fit.estimate import Estimate
-from rds.identification.logs.log import Log, as_logs
+from rds.identification.logs.log import Log, as_logs, named_apart
 from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import for_logs
@@ -49,7 +49,7 @@ def fit(
     structure = make_structure(structure) if isinstance(structure, str | Path) else structure
     if not isinstance(structure, Structure):
         raise InputError(f"{structure!r:.60} is no structure; give its name, such as 'axis', or rds.structure(...)")
-    named = _names_apart(logs)
+    named = named_apart(logs)
     structure = for_logs(structure, named)
     if method in _OF_POSITIONS and structure.is_rate and structure.name != "spindle":
         raise InputError(
@@ -58,7 +58,9 @@ def fit(
             named[0].source or named[0].name,
         )
     named, options = _with_gain(named, structure, dict(options or {}))
-    structure = structure.prepare(named) if structure.prepare else structure
+    if structure.prepare:
+        output, command = structure.output_unit, structure.command_unit  # of the logs, whatever is prepared
+        structure = replace(structure.prepare(named), output_unit=output, command_unit=command)
     estimated: Estimate = METHODS.module(method or structure.default_method).estimate(named, structure, options)
     if estimated.relative_error_percent is None:
         estimated = replace(estimated, relative_error_percent=voltage_error_percent(named, structure, estimated))
@@ -106,12 +108,3 @@ def voltage_error_percent(logs: Sequence[Log], structure: Structure, estimate: E
         extra = hypot(extra, float(np.linalg.norm(found.extra)))
         given = hypot(given, float(np.linalg.norm(found.command)))
     return 100.0 * extra / given
-
-
-def _names_apart(logs: Sequence[Log]) -> list[Log]:
-    """The logs, numbered where two have the same name: an estimate speaks of them by name."""
-    names = [log.name for log in logs]
-    return [
-        replace(log, name=f"{log.name} ({names[: i + 1].count(log.name)})") if names.count(log.name) > 1 else log
-        for i, log in enumerate(logs)
-    ]

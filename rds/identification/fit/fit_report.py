@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from base64 import b64encode
 from collections.abc import Sequence
-from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rds.core.atomic import write_files
 from rds.identification.fit.estimate_json import correlation_rows, described, error_rows, note, parameter_rows, to_json
+from rds.identification.logs.log import named_apart
 from rds.results.html import notes_list, table
 from rds.results.report import page
 
@@ -28,7 +28,7 @@ _POINTS = 20_000  # that a line of a picture is drawn with
 def write_fit(folder: Path, estimate: Estimate, logs: Sequence[Log], structure: Structure) -> list[Path]:
     """Write the page, a picture for each log and the numbers into `folder`, all or none; the page is first."""
     pictures = []
-    for number, log in enumerate(logs, 1):
+    for number, log in enumerate(named_apart(logs), 1):
         run = free_run_picture(estimate, log, structure).png()
         pictures.append(_Drawn(f"fit-{number}.png", log.name, "measured and free run", run))
         if estimate.method == "frequency":
@@ -36,7 +36,7 @@ def write_fit(folder: Path, estimate: Estimate, logs: Sequence[Log], structure: 
             pictures.append(_Drawn(f"bode-{number}.png", f"{log.name}: frequency response", "Bode diagram", bode))
     files = {PAGE: _page(estimate, pictures).encode(), NUMBERS: json.dumps(to_json(estimate), indent=2).encode()}
     files |= {picture.file: picture.png for picture in pictures}
-    write_files({folder / name: partial(_fill, data) for name, data in files.items()})
+    write_files({folder / name: data for name, data in files.items()})
     return [folder / name for name in files]
 
 
@@ -54,10 +54,6 @@ def _bode(estimate: Estimate, log: Log, structure: Structure) -> Picture:
     is_rate = structure.is_rate
     response = frequency_response(log, is_rate, estimate.details["period"])
     return bode_picture(response, estimate.values(), is_rate, estimate.parameters["K"].unit)
-
-
-def _fill(data: bytes, stream: BinaryIO) -> None:
-    stream.write(data)
 
 
 def free_run_picture(estimate: Estimate, log: Log, structure: Structure) -> Picture:

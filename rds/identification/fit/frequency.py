@@ -28,7 +28,7 @@ from rds.identification.fit.frequency_response import FrequencyResponse, frequen
 from rds.identification.fit.made_estimate import made_estimate
 from rds.identification.fit.regression import regress
 from rds.identification.fit.smoothing import motion_of
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, excited_part
 from rds.identification.structures.signals import SPEEDS
 from rds.identification.structures.structure import Structure
 
@@ -223,7 +223,7 @@ def _of_reversing(log: Log) -> str:
         f"1/(1 + 4F/(π·{size:.3g} {unit})), and no coherence shows it"
     )
     try:
-        found = simulation_error.estimate([log.part(0, min(len(log), _ENOUGH))], make(), {}).values()
+        found = simulation_error.estimate([excited_part(log, _ENOUGH)], make(), {}).values()
         friction = 0.5 * (found["friction_plus"] - found["friction_minus"])
         loss = 100.0 * (1.0 - 1.0 / (1.0 + 4.0 * friction / (np.pi * size)))
         said += f": some {loss:.2g} % here, where F is about {friction:.2g} {unit}"

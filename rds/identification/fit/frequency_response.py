@@ -20,7 +20,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
-from rds.identification.logs.log import Log, only_log
+from rds.identification.logs.log import Log, check_regular, only_log
 
 _REPEATS = 1e-6  # of the command's range: how exactly a period comes back
 _EXCITED = 0.01  # of the largest amplitude: which lines count as excited
@@ -28,7 +28,6 @@ _HIGHEST = 0.8  # of half the sampling frequency
 _COHERENT = 0.5  # by Welch's method: lines with less say nothing
 _SEGMENTS = 8  # windows side by side (with overlap nearly twice as many)
 _NEIGHBOURS = 4  # lines to each side over which the noise is taken to be the same
-_JITTER = 0.1  # of a sample period: how far a time may be off the regular grid
 
 
 @dataclass(frozen=True)
@@ -82,14 +81,7 @@ def frequency_response(log: Log, is_rate: bool | None = None, period: float | No
     """
     log = only_log(log)
     T = log.sample_period
-    off = np.abs(log.time - log.time[0] - T * np.arange(len(log)))
-    if off.max() > _JITTER * T:
-        at = int(np.argmax(off > _JITTER * T))
-        raise InputError(
-            f"at sample {at}, t = {log.time[at]:g} s is {off[at] / T:.2g} sample periods off a regular grid, which a "
-            "frequency response needs; take --method simulation, or resample the log",
-            log.source or log.name,
-        )
+    check_regular(log, "a frequency response")
     u, y = output_rate(log, log.is_rate if is_rate is None else is_rate)
     if not np.ptp(u) > 0.0:
         raise InputError(f"the command is {u[0]:g} throughout: it excites no frequency", log.name)
@@ -154,7 +146,12 @@ def _averaged(u: np.ndarray, y: np.ndarray, length: int, T: float) -> FrequencyR
     frequency = np.fft.rfftfreq(length, T)
     size = np.abs(U.mean(axis=0))
     band = (frequency > 0.0) & (frequency <= _HIGHEST * 0.5 / T)
-    excited = band & (size > _EXCITED * size[band].max())
+    excited = band & (size > _EXCITED * size[1:].max())
+    if not excited.any():
+        raise InputError(
+            f"the command excites no frequency up to {_HIGHEST * 0.5 / T:.4g} Hz ({_HIGHEST:.0%} of half the sampling "
+            "frequency); log a slower one, such as a multisine"
+        )
     count = periods - skip
     H = Y[:, excited].mean(axis=0) / U[:, excited].mean(axis=0)
     noise = Y[:, excited] - H * U[:, excited]

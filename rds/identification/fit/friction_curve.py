@@ -209,34 +209,34 @@ def _fitted(
             "slower"
         )
         return numbers, said
-    numbers = {
-        "F_c": Told(float(theta[0]), float(errors[0]), force_unit),
-        "F_v": Told(float(theta[1]) * per_si, float(errors[1]) * per_si, unit),
-    }
-    numbers |= _stribeck(v, f, theta, float(best), speed_unit, force_unit)
-    return numbers, said
+    return _stribeck(v, f, theta, float(best), speed_unit, force_unit, output), said
 
 
 def _stribeck(
-    v: np.ndarray, f: np.ndarray, theta: np.ndarray, vs: float, speed_unit: str, force_unit: str
+    v: np.ndarray, f: np.ndarray, theta: np.ndarray, vs: float, speed_unit: str, force_unit: str, output: str
 ) -> dict[str, Told]:
-    """F_s and v_s, refined together with the other two from the best of the grid, with standard errors."""
+    """All four numbers, refined together from the best of the grid, with standard errors."""
     with needed_for("a friction curve"):
         from scipy.optimize import least_squares
 
-    scale = np.array([1.0, 1.0, 1.0, vs])
-
     def miss(p: np.ndarray) -> np.ndarray:
-        return p[0] + p[1] * v + p[2] * np.exp(-((v / (p[3] * scale[3])) ** 2)) - f
+        return p[0] + p[1] * v + p[2] * np.exp(-((v / (p[3] * vs)) ** 2)) - f
 
     found = least_squares(miss, np.append(theta, 1.0), x_scale="jac")
     freedom = max(len(v) - 4, 1)
     slopes = np.asarray(found.jac)
     covariance = np.linalg.pinv(slopes.T @ slopes) * 2.0 * found.cost / freedom
-    rise = np.array([1.0, 0.0, 1.0, 0.0])
+    per_si, viscous_unit = _viscous(output, force_unit)
+    c, viscous, rise, width = np.eye(4)
+    rows = {
+        "F_c": (c, 1.0, force_unit),
+        "F_v": (viscous, per_si, viscous_unit),
+        "F_s": (c + rise, 1.0, force_unit),
+        "v_s": (width * np.sign(found.x[3]), vs, speed_unit),
+    }
     return {
-        "F_s": Told(float(rise @ found.x), float(np.sqrt(max(rise @ covariance @ rise, 0.0))), force_unit),
-        "v_s": Told(abs(float(found.x[3])) * vs, float(np.sqrt(max(covariance[3, 3], 0.0))) * vs, speed_unit),
+        name: Told(times * float(row @ found.x), times * float(np.sqrt(max(row @ covariance @ row, 0.0))), unit)
+        for name, (row, times, unit) in rows.items()
     }
 
 

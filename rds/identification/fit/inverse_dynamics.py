@@ -24,7 +24,7 @@ from rds.core.quantities import Quantity
 from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.made_estimate import made_estimate
 from rds.identification.fit.regression import Regression, regress
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, check_regular
 from rds.identification.structures.motion_form import MotionForm, motion_form
 from rds.identification.structures.structure import Structure
 
@@ -33,15 +33,19 @@ OPTIONS = {
     "cutoff": Quantity(
         "cut-off of the zero-phase filter; a tenth of the sampling frequency if not given", "Hz", above=0.0
     ),
-    "order": Quantity("order of the filter, run forward and backward; 4 if not given", low=1.0),
-    "decimation": Quantity("one of how many samples is kept; sampling frequency over cut-off if not given", low=1.0),
+    "order": Quantity("order of the filter, run forward and backward; 4 if not given", low=1.0, whole=True),
+    "decimation": Quantity(
+        "one of how many samples is kept; sampling frequency over cut-off if not given", low=1.0, whole=True
+    ),
     "hold": Quantity(
         "share of the command before in what acts at a sample: 0.5 for a held command, 0 for a force at that instant",
         low=0.0,
+        high=1.0,
     ),
-    "drop": Quantity("samples left out at each end; 4.9 sampling frequencies over the cut-off if not given", low=0.0),
+    "drop": Quantity(
+        "samples left out at each end; 4.9 sampling frequencies over the cut-off if not given", low=0.0, whole=True
+    ),
 }
-_JITTER = 0.1  # of a sample period: how far a time may be off the regular grid
 _REST = 2  # decimated samples within which an axis at rest moves no more than one step of its encoder
 _LEAST = 5  # rows for each coefficient
 
@@ -205,10 +209,7 @@ def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, A
         for name, value in options.items()
         if value is not None
     }
-    hold = numbers.get("hold", 0.0 if structure.name == "axis-mass" else 0.5)
-    if hold > 1.0:
-        raise InputError(f"inverse-dynamics: hold = {hold:g} must be at most 1 ({OPTIONS['hold'].meaning})")
-    rate = 1.0 / float(np.mean([log.sample_period for log in logs]))
+    rate = 1.0 / max(log.sample_period for log in logs)  # the slowest log's: its filter must be one
     cutoff = numbers.get("cutoff", rate / 10.0)
     if cutoff >= 0.5 * rate:
         raise InputError(
@@ -216,10 +217,10 @@ def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, A
         )
     return Settings(
         cutoff=cutoff,
-        order=int(numbers.get("order", 4)),
-        decimation=int(numbers.get("decimation", max(round(rate / cutoff), 1))),
-        drop=int(numbers.get("drop", round(4.9 * rate / cutoff))),
-        hold=hold,
+        order=numbers.get("order", 4),
+        decimation=numbers.get("decimation", max(round(rate / cutoff), 1)),
+        drop=numbers.get("drop", round(4.9 * rate / cutoff)),
+        hold=numbers.get("hold", 0.0 if structure.name == "axis-mass" else 0.5),
     )
 
 
@@ -229,14 +230,7 @@ def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[
         from scipy.signal import butter, decimate, filtfilt
 
     T = log.sample_period
-    off = np.abs(log.time - log.time[0] - T * np.arange(len(log)))
-    if off.max() > _JITTER * T:
-        at = int(np.argmax(off > _JITTER * T))
-        raise InputError(
-            f"at sample {at}, t = {log.time[at]:g} s is {off[at] / T:.2g} sample periods off a regular grid; filters "
-            "need regular times: take --method simulation, which uses times as they are, or resample the log",
-            log.source or log.name,
-        )
+    check_regular(log, "a filter")
     least = 2 * settings.drop + 4 * settings.decimation * len(form.names)
     if len(log) < max(least, 40):
         raise InputError(

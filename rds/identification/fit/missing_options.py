@@ -2,7 +2,7 @@
 
 Residuals well above the measurement's noise say that the machine does something that the structure lacks, not what. So
 each option that was not chosen is tried for a few free runs, beginning at the fit's own parameters and at those that
-the data suggest, over the first part of the logs. What is found is a hint, no estimate: that is for a fit of its own.
+the data suggest, over a part of the logs. What is found is a hint, no estimate: that is for a fit of its own.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rds.identification.fit.free_run_doubts import MISSED
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.fit.solve import least_squares
-from rds.identification.logs.log import RATES, Log
+from rds.identification.logs.log import RATES, Log, excited_part, named_apart
 from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import LIBRARY, structure
@@ -46,6 +46,7 @@ def missing_option(estimate: Estimate, logs: Sequence[Log]) -> str | None:
     """
     if estimate.method != SIMULATION_ERROR or estimate.structure not in LIBRARY.names():
         return None
+    logs = named_apart(logs)
     if all(estimate.free_run[log.name].rmse <= MISSED * motion_of(log).noise for log in logs):
         return None
     untellable = (*_UNTELLABLE, "backlash") if estimate.output_unit in RATES else _UNTELLABLE
@@ -56,7 +57,7 @@ def missing_option(estimate: Estimate, logs: Sequence[Log]) -> str | None:
     ]
     if not others:
         return None
-    parts = [log.part(0, max(_LONGEST // len(logs), _FEW)) for log in logs]
+    parts = [excited_part(log, max(_LONGEST // len(logs), _FEW)) for log in logs]
     signals = (estimate.output_unit, estimate.command_unit)
     least = _left(parts, structure(estimate.structure, estimate.options, *signals), estimate)
     if least is None:
@@ -76,7 +77,7 @@ def missing_option(estimate: Estimate, logs: Sequence[Log]) -> str | None:
     ranked = sorted(found, key=lambda option: found[option])
     said = ", ".join(f"{option} {found[option]:.2g} {unit}" for option in ranked)
     return (
-        f"try --option {ranked[0]}: over the first {sum(map(len, parts))} samples it would leave "
+        f"try --option {ranked[0]}: over {sum(map(len, parts))} samples it would leave "
         f"{found[ranked[0]]:.2g} {unit} in place of {least:.2g} {unit}"
         + (f" (by itself each: {said})" if len(ranked) > 1 else "")
     )

@@ -41,15 +41,17 @@ def _end(problem: Problem, point: np.ndarray, squares: float, name: str, reach: 
     before, grown = 0.0, 0.0
     far = 1.0
     while far <= _FARTHEST:
-        value = float(point[place] + far * reach)
-        if not low <= value <= high:
-            return max(before, 1.0)  # it cannot go there
+        value = float(np.clip(point[place] + far * reach, low, high))
+        is_end = value in (low, high)  # it can go no farther
+        far = (value - float(point[place])) / reach if is_end else far
         held = Problem(problem.logs, problem.structure, {**problem.fixed, name: value})
         solution = least_squares(held, start, _RUNS)
         more = solution.squares - squares
         if more > allowed:
             share = (allowed - grown) / (more - grown)
             return max(before + (far - before) * share, 1.0)
+        if is_end:
+            return max(far, 1.0)
         start, before, grown = solution.point, far, max(more, 0.0)
         far *= 2.0
     return float("inf")

@@ -52,6 +52,12 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
             raise InputError(f"structure {structure.name}: {name} is given with the log and cannot be fixed as well")
     held = structure.held(frozenset(fixed)) if structure.held else {}
     holding = {**fixed, **given, **{name: value for name, (value, _) in held.items()}}
+    for name in begun:
+        if name in holding:
+            raise InputError(
+                f"structure {structure.name}: {name} is held at {holding[name]:g}, so no search begins at "
+                f"{begun[name]:g}; leave its start out, or do not hold it"
+            )
     unknowns = len(structure.parameters) - len(holding) + structure.states * len(logs)
     if (samples := sum(len(log) for log in logs)) <= unknowns:
         raise InputError(
@@ -124,14 +130,13 @@ def _widen(
     values = problem.values(solution.point)
     whole = Problem(logs, structure, holding)  # with those that were held for want of an occasion to tell them
     states = [problem.state(solution.point, number) for number in range(len(logs))]
-    samples = sum(len(log) for log in logs)
     freedom = max(uncertainty.effective - problem.size, 1.0)
     reaches = {
         name: t_quantile(freedom) * float(np.sqrt(variance))
         for name in problem.names
         if 0.0 < (variance := covariance[order.index(name), order.index(name)]) < np.inf
     }
-    allowed = t_quantile(freedom) ** 2 * solution.squares / samples * (samples / uncertainty.effective)
+    allowed = t_quantile(freedom) ** 2 * solution.squares / uncertainty.effective
     factors = widening(whole, whole.point(values, states), solution.squares, reaches, allowed)
     open_ended = [name for name, factor in factors.items() if not np.isfinite(factor)]
     scale = np.array([factors.get(name, 1.0) if name not in open_ended else 1.0 for name in order])

@@ -22,7 +22,7 @@ from rds.core.compiling import kernel
 from rds.core.errors import InputError
 from rds.identification.fit.smoothing import Motion, motion_of
 from rds.identification.fit.stick_grid import stick_starts
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, excited_part
 
 GRID = 13  # time constants that are tried
 MOST_SAMPLES = 200_000  # of each log: more say nothing new about where to begin
@@ -38,16 +38,17 @@ def axis_starts(
 
     InputError where no log holds any motion, or no voltage that differs from 0.
     """
-    parts = [log.part(0, min(len(log), MOST_SAMPLES)) for log in logs]
+    whole = [motion_of(log) for log in logs]
+    _check_excitation(logs, whole)
+    parts = [excited_part(log, MOST_SAMPLES) for log in logs]
     motions = [motion_of(part) for part in parts]
-    _check_excitation(parts, motions)
     longest = max(float(part.time[-1] - part.time[0]) for part in parts)
     finest = min(part.sample_period for part in parts)
     grid = np.geomspace(0.5 * finest, max(0.1 * longest, 2.0 * finest), GRID)
     costs, solutions = _regressions(parts, motions, grid)
     minima = [i for i in range(GRID) if costs[i] <= costs[max(i - 1, 0)] and costs[i] <= costs[min(i + 1, GRID - 1)]]
     minima.sort(key=lambda i: float(costs[i]))
-    begins = [_initial_state(log, motion, states) for log, motion in zip(parts, motions, strict=True)]
+    begins = [_initial_state(log, motion, states) for log, motion in zip(logs, whole, strict=True)]
     first, *rest = ((solutions[i], float(grid[i])) for i in minima[:2])
     for solved, tau in chain([first], stick_starts(parts), rest):
         yield _values(solved, tau, names, parts, motions), begins

@@ -19,7 +19,7 @@ import numpy as np
 
 from rds.core.compiling import COMPILED
 from rds.core.extras import needed_for
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, excited_part
 from rds.identification.structures.axis_motion import MINUS, PLUS, POSITION, STRIBECK_VELOCITY, TAU, move
 from rds.identification.structures.axis_motion import K as GAIN
 
@@ -43,7 +43,7 @@ class _Place(NamedTuple):
 
 def stick_starts(logs: Sequence[Log]) -> Iterator[tuple[np.ndarray, float]]:
     """(K, F₊, F₋) and τ (s), from the best places of the grid whose friction differs, the best first."""
-    parts = [log.part(0, min(len(log), _MOST_SAMPLES)) for log in logs]
+    parts = [excited_part(log, _MOST_SAMPLES) for log in logs]
     whole = sum(len(part) * float(part.position.var()) for part in parts)
     places = _places(parts, 1.0)
     if not places or places[0].cost > _RIGHT * whole:

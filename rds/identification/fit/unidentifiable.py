@@ -64,7 +64,7 @@ def _together(
         # shares of equal size are a sum: by small changes it looks like a product
         adds = structure.units.get(one) == structure.units.get(other) and np.isclose(values[one], values[other], 0.02)
         words = ("difference", "sum") if adds else ("ratio", "product")
-        word = words[by * as_well < 0.0]
+        word = words[int(by * as_well < 0.0)]
         return f"{one} and {other} come only as their {word}: these data cannot tell them apart"
     if parts[0][1] < 0.0:
         parts = [(name, -change) for name, change in parts]

@@ -59,8 +59,9 @@ def align(
     like one motion, or like it at several offsets (a periodic motion).
     """
     for name, values in (("first", first), ("second", second)):
-        if np.ptp(values) == 0.0:
-            raise InputError(f"the {name} file's column for the alignment is constant; choose one that moves")
+        if len(values) == 0 or np.ptp(values) == 0.0:
+            what = "is constant" if len(values) else "holds no numbers"
+            raise InputError(f"the {name} file's column for the alignment {what}; choose one that moves")
     if relation == "rate":
         second = _slope(second_time, second)
     lag = _coarse(first_time, first, second_time, second, window)

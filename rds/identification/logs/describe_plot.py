@@ -35,7 +35,7 @@ def overview(logs: Sequence[Log]) -> Picture:
         position.plot(*thin(log.time, log.position), color=BLUE, linewidth=1.0, label="measured")
         seen = motion(log)
         middle = log.time[: len(seen.speed) * seen.width : seen.width] + 0.5 * seen.width * log.sample_period
-        what = f"speed [{unit}/s]" if unit != "rev/min" else "speed [rev/min]"
+        what = f"speed [{unit if log.is_rate else f'{unit}/s'}]"
         speed.plot(*thin(middle, seen.speed), color=GREEN, linewidth=1.0, label=f"means over {seen.width} samples")
         off = 100.0 * (np.diff(log.time) / log.sample_period - 1.0)
         clock.plot(*thin(log.time[1:], off), color=ORANGE, linewidth=0.8)

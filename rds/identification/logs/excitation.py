@@ -89,7 +89,7 @@ def _starts(log: Log) -> bool:
 
 def _goes(log: Log, way: float, reach: float) -> bool:
     """Whether the position moves that way by more than noise and steps, however slowly; a speed tells by its sign."""
-    if log.units.get("position") == "rev/min":
+    if log.is_rate:
         return False
     least = max(_MOVED * (log.resolution or 0.0), _BEYOND_NOISE * noise(log.position), _LEAST * reach)
     return travel(log.position, way) > least

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -16,6 +16,7 @@ from rds.core.quantities import Quantity
 
 # what a column can be, beside time
 QUANTITIES = ("command", "position", "velocity", "current", "force", "reference", "following_error")
+_JITTER = 0.1  # of a sample period: how far a time may be off where a grid is needed
 RATES = ("rev/min", "mm/s")  # units of a position that is a speed: of a spindle, or of a log without a position
 
 
@@ -153,6 +154,44 @@ class Log:
             position=self.position[chosen],
             extra={key: values[chosen] for key, values in self.extra.items()},
         )
+
+
+def check_regular(log: Log, what: str) -> None:
+    """InputError where a time is more than a tenth of a sample period off a regular grid, which `what` needs."""
+    T = log.sample_period
+    off = np.abs(log.time - log.time[0] - T * np.arange(len(log))) / T
+    if off.max() > _JITTER:
+        at = int(np.argmax(off > _JITTER))
+        raise InputError(
+            f"at sample {at}, t = {log.time[at]:g} s is {off[at]:.2g} sample periods off a regular grid, which {what} "
+            "needs; take --method simulation, which uses times as they are, or resample the log",
+            log.source or log.name,
+        )
+
+
+def excited_part(log: Log, most: int) -> Log:
+    """At most so many samples of a log, from where its command first changes: before that, many a log is at rest."""
+    changes = np.flatnonzero(np.diff(log.command))
+    first = min(int(changes[0]) if len(changes) else 0, max(len(log) - most, 0))
+    return log.part(first, first + most)
+
+
+def apart(names: Sequence[str]) -> list[str]:
+    """The names, numbered where they repeat, so that no two are the same: `log (1)`, `log (2)`."""
+    found: list[str] = []
+    for name in names:
+        own, number = name, 0
+        while own in found or (own in names if number else names.count(name) > 1):
+            number += 1
+            own = f"{name} ({number})"
+        found.append(own)
+    return found
+
+
+def named_apart(logs: Sequence[Log]) -> list[Log]:
+    """The logs by names of their own: whatever is said of several logs is said by name."""
+    names = apart([log.name for log in logs])
+    return [replace(log, name=name) if log.name != name else log for log, name in zip(logs, names, strict=True)]
 
 
 def only_log(given: Any) -> Log:

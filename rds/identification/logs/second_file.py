@@ -34,7 +34,9 @@ def read_second(first: Table, mapping: LogMap) -> Second:
     table = read_table(about.file, about.delimiter, about.decimal, mapping.dbc)
     time = column_time(table, about.time)
     if about.offset is not None:
-        alignment = Alignment(about.offset, about.drift or 0.0, 0.0, 0.0, float(time[0]), np.nan)
+        stamps = [time, *(column.time for column in table.columns.values() if column.time is not None)]
+        begin = float(np.nanmin(np.concatenate(stamps)))
+        alignment = Alignment(about.offset, about.drift or 0.0, 0.0, 0.0, begin, np.nan)
         what = (
             f"second clock: offset {about.offset:g} s and drift {1e6 * (about.drift or 0.0):g} ppm, as the map states"
         )
@@ -44,10 +46,9 @@ def read_second(first: Table, mapping: LogMap) -> Second:
     other = table.column(about.second_column, about.place)
     own_time = own.time if own.time is not None else column_time(first, mapping.time)
     other_time = other.time if other.time is not None else time
+    (own_time, own_values), (other_time, other_values) = _clean(own_time, own.values), _clean(other_time, other.values)
     try:
-        alignment = align(
-            *_clean(own_time, own.values), *_clean(other_time, other.values), about.relation, about.window
-        )
+        alignment = align(own_time, own_values, other_time, other_values, about.relation, about.window)
     except InputError as error:
         raise InputError(str(error), about.place) from error
     period = float(np.median(np.diff(own_time)))

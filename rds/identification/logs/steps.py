@@ -111,7 +111,7 @@ def saturation(log: Log, axis: Axis | None) -> list[Finding]:
 
 def _ends(log: Log, axis: Axis | None) -> list[Finding]:
     unit = log.units.get("position", "mm")
-    if unit == "rev/min":
+    if log.is_rate:
         return []
     if axis is not None and axis.unit == unit:
         out = (log.position <= axis.travel[0]) | (log.position >= axis.travel[1])

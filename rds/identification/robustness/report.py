@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Mapping
-from functools import partial
 from html import escape
 from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -40,7 +39,7 @@ def write_study(study: Study, folder: Path, title: str) -> dict[str, Path]:
     files |= {"report": folder / "report.html", "draws": folder / "draws.csv"}
     data[files["report"]] = study_page(study, title, drawn).encode()
     data[files["draws"]] = draws_table(study).encode()
-    write_files({path: partial(_write, content) for path, content in data.items()})
+    write_files(data)
     return files
 
 
@@ -116,7 +115,3 @@ def draws_table(study: Study) -> str:
     for row in zip(*columns, strict=True):
         stream.write(",".join([str(int(row[0])), *(repr(float(value)) for value in row[1:])]) + "\n")
     return stream.getvalue()
-
-
-def _write(content: bytes, stream: BinaryIO) -> None:
-    stream.write(content)

@@ -116,9 +116,11 @@ def _by_ranges(axis: AxisPlan, file: ModelFile | None, ranges: Mapping[str, tupl
     if file is None and axis.model.source.path is None and axis.model.source.name not in model_names():
         raise InputError(f"axis {axis.axis.name}: ranges are for models of the library, files and model files")
     numbers = {key: float(v) for key, v in params.items() if isinstance(v, int | float) and not isinstance(v, bool)}
-    for name in ranges:
+    for name, ends in ranges.items():
         if name not in numbers:
             raise InputError(f"axis {axis.axis.name} has no parameter {name!r}; it has {', '.join(numbers)}")
+        if fault := _fault(ends):
+            raise InputError(f"axis {axis.axis.name}: the range {name} = {ends!r:.60} {fault}")
     names = tuple(numbers) if file is not None else tuple(ranges)
     low, high = np.array([ranges.get(name, (numbers[name], numbers[name])) for name in names], float).T
     units = file.units() if file is not None else dict.fromkeys(names, "")
@@ -141,9 +143,14 @@ def read_ranges(path: str | Path) -> dict[str, dict[str, tuple[float, float]]]:
 
 def _range(table: TomlTable, name: str) -> tuple[float, float]:
     value: Any = table.any(name)
-    is_pair = isinstance(value, list) and len(value) == 2
-    if not is_pair or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in value):
-        raise table.fault(name, "must be [lowest, highest]")
-    if not -_LARGEST <= value[0] <= value[1] <= _LARGEST:
-        raise table.fault(name, "must be finite, lowest first")
+    if fault := _fault(value):
+        raise table.fault(name, fault)
     return float(value[0]), float(value[1])
+
+
+def _fault(ends: Any) -> str | None:
+    """Why these are no ends of a range; None where they are."""
+    is_pair = isinstance(ends, list | tuple) and len(ends) == 2
+    if not is_pair or not all(isinstance(end, int | float) and not isinstance(end, bool) for end in ends):
+        return "must be [lowest, highest]"
+    return None if -_LARGEST <= ends[0] <= ends[1] <= _LARGEST else "must be finite, lowest first"

@@ -89,12 +89,12 @@ class _Start:
         self.options = options
 
     def __call__(self, logs: Sequence[Log]) -> list[tuple[dict[str, float], list[tuple[float, ...]]]]:
-        for log in logs:
-            if not np.ptp(log.position) > 0.0 or not np.ptp(log.command) > 0.0:
-                what = "speed" if np.ptp(log.command) > 0.0 else "command"
-                raise InputError(
-                    f"the {what} never changes, so there is nothing to tell a time constant or gain from", log.name
-                )
+        if not any(np.ptp(log.position) > 0.0 and np.ptp(log.command) > 0.0 for log in logs):
+            what = "speed" if any(np.ptp(log.command) > 0.0 for log in logs) else "command"
+            names = ", ".join(log.name for log in logs)
+            raise InputError(
+                f"the {what} never changes, so there is nothing to tell a time constant or gain from", names
+            )
         states: list[tuple[float, ...]] = [(float(log.position[0]),) for log in logs]
         candidates = []
         for step in np.unique(np.geomspace(1, max(min(len(log) for log in logs) // 8, 1), 12).astype(int)):

@@ -26,7 +26,7 @@ from rds.core.load import StudentFile, load_student
 from rds.core.quantities import Quantity
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.fit.solve import first_state
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, excited_part
 from rds.identification.structures.model_structure import structure_of_model
 from rds.identification.structures.structure import Structure
 
@@ -56,12 +56,13 @@ def _structure(student: StudentFile, path: str | Path, substeps: int) -> Structu
         )
     bounds = _bounds(student, begun, where)
     units = _table(student, "units", begun, where)
-    model = student_model(student)
+    model = student_model(student, substeps=substeps)
+    simulated = structure_of_model(model).respond
     states = len(model.initial_state)
 
     def respond(t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float]) -> np.ndarray:
         try:
-            return structure_of_model(student_model(student, values, substeps)).respond(t, u, x0, {})
+            return simulated(t, u, x0, values)
         except InputError:
             raise
         except STUDENT_ERRORS as error:
@@ -97,7 +98,7 @@ def _quicker(
     student: StudentFile, path: str | Path, structure: Structure, begun: Mapping[str, float], logs: Sequence[Log]
 ) -> Structure:
     """The structure with the fewest Runge-Kutta steps that change its free run by a tenth of the noise at most."""
-    part = logs[0].part(0, _TRIED)
+    part = excited_part(logs[0], _TRIED)
     noise = motion_of(part).noise
     state = first_state(structure, part)
     with np.errstate(all="ignore"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from rds.core.errors import InputError
@@ -16,14 +16,19 @@ from rds.identification.validate.within import measures
 _SHORTEST = 400  # samples of a half
 
 
-def with_alternatives(candidate: Candidate, a: Assessment, verdict: Verdict, bands: Bands) -> Verdict:
-    """The verdict with a note on what other choices would say, where one of its figures is near its band."""
+def with_alternatives(
+    candidate: Candidate, a: Assessment, verdict: Verdict, bands: Bands, more: Sequence[Reason] = ()
+) -> Verdict:
+    """The verdict with a note on what other choices would say, where one of its figures is near its band.
+
+    `more` are the reasons that no choice changes: what the loop that was logged says.
+    """
     if not _borderline(a, bands):
         return verdict
     words, tried = {}, []
     for what, model, log, samples in _choices(candidate, a):
         try:
-            other = judge(model, assess(model, log, samples, bands.bandwidth), bands)
+            other = judge(model, assess(model, log, samples, bands.bandwidth), bands, more)
         except InputError:  # too little of a log
             continue
         tried.append(what)

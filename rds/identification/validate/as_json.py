@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from rds.identification.fit.residuals import Correlation
     from rds.identification.validate.assessment import Assessment
     from rds.identification.validate.candidate import Candidate
-    from rds.identification.validate.criterion import Ranking
     from rds.identification.validate.validate import Validation
 
 
@@ -27,7 +26,7 @@ def to_json(validation: Validation) -> dict[str, Any]:
                 name: _log(a) | {"conclusion": validation.verdicts[name].to_json()}
                 for name, a in validation.assessments.items()
             },
-            "comparison": {name: _ranking(ranking) for name, ranking in validation.rankings.items()},
+            "comparison": {name: asdict(ranking) for name, ranking in validation.rankings.items()},
         }
     )
 
@@ -108,7 +107,3 @@ def _errors(errors: Errors | None) -> dict[str, Any] | None:
 def _correlation(found: Correlation) -> dict[str, Any]:
     value, lag = found.largest if len(found.values) else (0.0, 0.0)
     return {"band": found.band, "outside": found.outside, "largest": value, "lag": lag}
-
-
-def _ranking(ranking: Ranking) -> dict[str, Any]:
-    return asdict(ranking)

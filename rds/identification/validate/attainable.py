@@ -17,7 +17,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.identification.fit.estimate import Parameter
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, excited_part
 from rds.identification.validate.candidate import Candidate
 
 _LONGEST = 200_000  # samples that are fitted
@@ -60,8 +60,8 @@ class Attainable:
 
 
 def attainable(candidate: Candidate, log: Log, start: tuple[float, ...], noise: float) -> Attainable | None:
-    """The least RMSE that the structure reaches on the first 200,000 samples of `log`, from the initial state `start`;
-    `noise` is the measurement's.
+    """The least RMSE that the structure reaches on 200,000 samples of `log` at most, those from where its command first
+    changes; the search begins at the initial state `start`, and `noise` is the measurement's.
 
     None where that says nothing: a closed loop (a free run lacks the controller), a model without estimated parameters,
     or one whose derivatives are not known (a student's file, for which a search would take minutes).
@@ -73,7 +73,7 @@ def attainable(candidate: Candidate, log: Log, start: tuple[float, ...], noise: 
     names, structure = candidate.estimated, candidate.structure
     if log.closed_loop or not names or structure.sensitivities is None:
         return None
-    part = log.part(0, _LONGEST)
+    part = excited_part(log, _LONGEST)
     held = {name: value for name, value in candidate.values.items() if name not in names}
     try:
         alone = Problem([part], structure, candidate.values)

@@ -34,6 +34,7 @@ class Candidate:
     fitted_on: tuple[Mapping[str, Any], ...] = ()
     source: str = ""
     unusable: tuple[str, ...] = ()  # what the fit warned of that leaves nothing to believe in
+    model: Model | None = None  # as it was given, where it was one already
 
     @property
     def is_rate(self) -> bool:
@@ -88,7 +89,7 @@ def of_model(model: Model, name: str = "", unit: str = "mm") -> Candidate:
     """A library's or student's model, whose parameters nobody says were fitted; `unit` is that of its output."""
     made = structure_of_model(model, unit)
     values = {key: float(model.params[key]) for key in made.parameters}
-    return Candidate(name or model.source.name, made, values, source=model.source.path or "")
+    return Candidate(name or model.source.name, made, values, source=model.source.path or "", model=model)
 
 
 def _of_estimate(estimate: Estimate, name: str) -> Candidate:

@@ -30,7 +30,7 @@ from rds.identification.fit.problem import Problem
 from rds.identification.fit.residuals import effective_samples
 from rds.identification.fit.solve import Solution, first_state, least_squares
 from rds.identification.fit.uncertainty import uncertainty_of
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import Log, excited_part
 from rds.identification.structures.signals import POSITIONS
 from rds.identification.structures.structure import Start, Structure
 from rds.identification.validate.candidate import Candidate
@@ -92,7 +92,7 @@ def as_axis(candidate: Candidate, log: Log, noise: float, frequency: float = 0.0
     made, values = known
     T = log.sample_period
     early = int(min(max(_EARLY[0], ceil(values["tau"] / T)), _EARLY[1], len(log) // 10))
-    part = _advanced(log.part(0, LONGEST), early)
+    part = _advanced(excited_part(log, LONGEST), early)
     logs = stretches(part, values["tau"]) if log.closed_loop else [part]
     begun = {**values, "delay": values.get("delay", 0.0) + early * T}
     held = {name: begun[name] for name in ("viscous",) if name in begun}

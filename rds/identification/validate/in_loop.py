@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import sqrt
-from pathlib import Path
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from rds.models import library_model
 from rds.results.result import Result
 
 _AS_NOISE = 1.5  # times the measurement's noise: what is nearer, noise explains
+_LEAST = 20  # samples
 _SETTLING = 0.05  # of the log, at its begin: where the axis may have been elsewhere
 
 
@@ -65,10 +65,17 @@ def in_loop(candidate: Candidate, log: Log, simulate: Loop) -> InLoop:
             "experiment that was logged",
             log.source or log.name,
         )
-    n = min(len(log), len(result))
+    n = min(len(log), len(result) - log.first)
+    if n < _LEAST:
+        raise InputError(
+            f"the experiment has {len(result)} samples, and the log begins at its sample {log.first}; give the "
+            "experiment that was logged",
+            log.source or log.name,
+        )
+    same = slice(log.first, log.first + n)  # of a log that is a part of what was logged
     reference = log.extra.get("reference")
-    wanted = np.asarray(result[f"{axis}_reference"] if reference is None else reference, dtype=float)[:n]
-    measured, simulated = log.position[:n], np.asarray(result[f"{axis}_measured"], dtype=float)[:n]
+    wanted = np.asarray(result[f"{axis}_reference"][same] if reference is None else reference[:n], dtype=float)
+    measured, simulated = log.position[:n], np.asarray(result[f"{axis}_measured"][same], dtype=float)
     counted = slice(round(_SETTLING * n), n)
     return InLoop(
         rmse=float(np.std((simulated - measured)[counted])),
@@ -130,15 +137,14 @@ def _of_loop(found: InLoop, bands: Bands) -> Iterator[Reason]:
 
 def _model(candidate: Candidate) -> Model:
     """The model as one that an experiment takes."""
+    if candidate.model is not None:
+        return candidate.model
     made = candidate.structure
     if candidate.source:
-        from rds.core.load import load_student
         from rds.identification.fit.model_file import read_model
         from rds.identification.fit.run_model import run_model
-        from rds.models.student import student_model
 
-        path = Path(candidate.source)
-        return run_model(read_model(path)) if path.suffix == ".toml" else student_model(load_student(path))
+        return run_model(read_model(candidate.source))
     if made.name.endswith(".py"):
         raise InputError(f"the model {candidate.name} is no file, and only a file is simulated in a loop")
     table = library_table(made, candidate.values)

@@ -271,7 +271,7 @@ def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
     if found.reached < found.noise:
         numbers += f", {found.noise:.3g} {a.unit} for the measurement's noise"
     if found.samples < len(a.log):
-        numbers += f", over the first {found.samples * a.log.sample_period:.3g} s"
+        numbers += f", over {found.samples * a.log.sample_period:.3g} s of the log"
     if found.ratio > bands.attainable:
         text = (
             f"the free run is {found.ratio:.3g} times as far off as that of the same structure fitted to this log "

@@ -100,7 +100,7 @@ def of_upsets(a: Assessment) -> Iterator[Reason]:
     """Where in time the log does something else; the verdict is on the whole."""
     if a.free_run is None or a.motion == 0.0:
         return
-    for sentence in upsets(a.time, a.residual, a.noise, a.unit, a.measured - a.residual, a.log.resolution):
+    for sentence in upsets(a.time, a.residual, a.noise, a.unit, a.modelled, a.log.resolution):
         yield Reason(Side.NOTE, "upset", sentence)
 
 

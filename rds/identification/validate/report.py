@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
-from functools import partial
 from html import escape
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from rds.core.atomic import write_files
 from rds.identification.validate.verdict import Verdict, Word
@@ -43,12 +42,8 @@ def write(validation: Validation, folder: Path) -> list[Path]:
         folder / NUMBERS: numbers.encode(),
         **contents,
     }
-    write_files({path: partial(_fill, data) for path, data in files.items()})
+    write_files(files)
     return list(files)
-
-
-def _fill(data: bytes, stream: BinaryIO) -> None:
-    stream.write(data)
 
 
 def section(title: str, validation: Validation) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.identification.logs.log import Log, as_logs, only_log
+from rds.identification.logs.log import Log, apart, as_logs, only_log
 from rds.identification.validate.alternatives import with_alternatives
 from rds.identification.validate.assessment import Assessment, assess
 from rds.identification.validate.candidate import Candidate, as_candidate
@@ -97,7 +97,7 @@ def validate(
     if not logs:
         raise InputError("there is no log to validate on; name at least one")
     bands = bands or Bands()
-    names = _names([log.name for log in logs])
+    names = apart([log.name for log in logs])
     others = _others(candidate, against)
     assessments = {
         name: assess(candidate, log, initial_samples, bands.bandwidth) for name, log in zip(names, logs, strict=True)
@@ -105,7 +105,7 @@ def validate(
     verdicts = {}
     for name, a in assessments.items():
         more = tuple(closed_loop_reasons(candidate, a, loop, bands))
-        verdicts[name] = with_alternatives(candidate, a, judge(candidate, a, bands, more), bands)
+        verdicts[name] = with_alternatives(candidate, a, judge(candidate, a, bands, more), bands, more)
     rankings = {name: _ranking(candidate, a, others, bands, initial_samples) for name, a in assessments.items()}
     return Validation(candidate, assessments, verdicts, bands, others, rankings if others else {})
 
@@ -121,14 +121,9 @@ def compare_models(
     return _ranking(first, a, _others(first, models[1:]), bands or Bands(), initial_samples)
 
 
-def _names(names: Sequence[str]) -> list[str]:
-    """The logs' names, numbered where they repeat."""
-    return [f"{n} {names[: i + 1].count(n)}" if names.count(n) > 1 else n for i, n in enumerate(names)]
-
-
 def _others(candidate: Candidate, against: Sequence[Any]) -> tuple[Candidate, ...]:
     others = [as_candidate(model) for model in against]
-    names = _names([candidate.name, *(other.name for other in others)])
+    names = apart([candidate.name, *(other.name for other in others)])
     return tuple(as_candidate(other, name) for other, name in zip(others, names[1:], strict=True))
 
 

@@ -90,7 +90,7 @@ class Measure:
     @property
     def borderline(self) -> bool:
         """Whether a slightly other band would say otherwise."""
-        return 0.75 <= abs(self.off.value) / self.band <= 1.33
+        return 0.75 * self.band <= abs(self.off.value) <= 1.33 * self.band
 
 
 def judged_by(a: Assessment, bands: Bands) -> Discrepancy | None:

@@ -91,9 +91,12 @@ def read(path: Path, settings: Mapping[str, Any]) -> Moves:
     about = _about(path, settings)
     missing = [name for name in ("distance", "counts_per_unit") if about[name] is None]
     if missing:
+        where = f"write {path.stem}.toml beside it with"
+        if settings.get("about"):
+            where = f"give {settings['about']} a table [{path.stem}] with"
         raise InputError(
             f"{' and '.join(missing)} not known; give the option{'s' if len(missing) > 1 else ''}, "
-            f"or write {path.stem}.toml beside it with lines such as 'distance = 80.0' and 'counts_per_unit = 169'",
+            f"or {where} lines such as 'distance = 80.0' and 'counts_per_unit = 169'",
             str(path),
         )
     unit = about["unit"] or UNITS[0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.results.reports.content import Report, Table
-from rds.results.reports.reading import Column, columns_in, read_columns, without_readings_of
+from rds.results.reports.reading import Column, columns_in, names_of, read_columns, without_readings_of
 from rds.results.reports.settings import Setting
 from rds.results.reports.statistics import summary
 from rds.results.reports.windows import EXAMPLE, Window, parse_windows
@@ -42,7 +43,7 @@ class Current:
     """One record of current."""
 
     name: str
-    source: str  # stem of the file
+    source: str  # what its file is called
     where: str
     values: np.ndarray  # A
     time: np.ndarray | None = None  # s
@@ -50,7 +51,8 @@ class Current:
 
 def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
     """Statistics and pictures of all files. InputError for data or options that will not do."""
-    records = [record for path in files for record in _read(path, settings)]
+    names = names_of(files)
+    records = [record for path, name in zip(files, names, strict=True) for record in _read(path, name, settings)]
     starting, idle = settings["starting"], settings["idle"]
     for record in records:
         _long_enough(record, max(starting, idle))
@@ -68,17 +70,17 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
         [path.name for path in files],
         settings,
         tables,
-        {f"Current of {path.stem}": _drawing(path, records, starting, idle) for path in files},
+        {
+            f"Current of {name}": partial(
+                picture, [record for record in records if record.source == name], starting, idle
+            )
+            for name in names
+        },
         _findings(records, starting, idle),
     )
 
 
-def _drawing(path: Path, records: Sequence[Current], starting: int, idle: int) -> Any:
-    mine = [record for record in records if record.where == str(path)]
-    return lambda: picture(mine, starting, idle)
-
-
-def _read(path: Path, settings: Mapping[str, Any]) -> list[Current]:
+def _read(path: Path, source: str, settings: Mapping[str, Any]) -> list[Current]:
     columns = without_readings_of(read_columns(path), "acceleration_[xyz]")  # for the report on vibration
     timed = next((column for column in columns if column.name.lower() in ("time", "t")), None)
     currents = columns_in(path, [c for c in columns if c is not timed], tuple(_AMPERES), "currents", "cw_A")
@@ -86,13 +88,15 @@ def _read(path: Path, settings: Mapping[str, Any]) -> list[Current]:
     found = []
     for column in currents:
         values = _AMPERES[column.unit] * np.asarray(column.numbers(blanks=timed is None))
-        if time is None and settings["period"] is not None:
-            at: np.ndarray | None = settings["period"] * np.arange(len(values))
-        else:
-            at = time
-        name = path.stem if len(currents) == 1 else f"{path.stem} {column.name}"
-        found.append(Current(name, path.stem, str(path), values, at))
+        at = time if settings["period"] is None else settings["period"] * _rows_read(column)
+        name = source if len(currents) == 1 else f"{source} {column.name}"
+        found.append(Current(name, source, str(path), values, at))
     return found
+
+
+def _rows_read(column: Column) -> np.ndarray:
+    """Which rows, from 0, have a reading in this column."""
+    return np.flatnonzero([bool(cell) for cell in column.cells.values()])
 
 
 def _time(column: Column) -> np.ndarray:

@@ -21,7 +21,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.results.reports.content import Report, Table
 from rds.results.reports.gauges import PATH, STRAIGHT, Readings, Segment, read_gauges
-from rds.results.reports.reading import columns_in, read_columns
+from rds.results.reports.reading import columns_in, names_of, read_columns
 from rds.results.reports.settings import Setting
 
 if TYPE_CHECKING:
@@ -63,7 +63,10 @@ class Face:
 def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
     """Flatness of each file's face. InputError for data or options that will not do."""
     by_methods = any(set(PATH) <= {column.heading for column in read_columns(path)} for path in files)
-    faces = _cut_faces(files, settings) if by_methods else [_read(path) for path in files]
+    if by_methods:
+        faces = _cut_faces(files, settings)
+    else:
+        faces = [_read(path, name) for path, name in zip(files, names_of(files), strict=True)]
     columns = ["face", "readings", "mean height [mm]", "largest relative error [mm]", "std [mm]", "flatness [mm]"]
     columns += ["slope in x [mm/m]", "slope in y [mm/m]"]
     rows = [_row(face) for face in faces] + ([_THESIS] if by_methods else [])
@@ -82,7 +85,7 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
     )
 
 
-def _read(path: Path) -> Face:
+def _read(path: Path, name: str) -> Face:
     found = {
         column.name: column
         for column in columns_in(path, read_columns(path), ("mm",), "a grid of readings", "x_mm, y_mm, z_mm")
@@ -90,7 +93,7 @@ def _read(path: Path) -> Face:
     if missing := [name for name in _FACE if name not in found]:
         raise InputError(f"there is no column {missing[0]}_mm; a face needs x_mm, y_mm and z_mm", str(path))
     points = np.column_stack([found[name].numbers(_LEAST) for name in _FACE])
-    return _face(path.stem, points, path)
+    return _face(name, points, path)
 
 
 def _face(name: str, points: np.ndarray, path: Path) -> Face:
@@ -111,11 +114,10 @@ def _cut_faces(files: Sequence[Path], settings: Mapping[str, Any]) -> list[Face]
         )
     lowest = min(each.start[2] for each in level)
     corners = np.concatenate([_extent(each) for each in level if each.start[2] == lowest])
-    axes = [
-        np.arange(low, high + 1e-9, settings["grid"]) for low, high in zip(corners.min(0), corners.max(0), strict=True)
-    ]
-    if (count := len(axes[0]) * len(axes[1])) > _MOST:
-        raise InputError(f"grid = {settings['grid']:g} mm makes {count} readings, and {_MOST} can be shown; take more")
+    low, high, grid = corners.min(0), corners.max(0), settings["grid"]
+    if (count := float(np.prod(np.floor((high - low) / grid) + 1.0))) > _MOST:
+        raise InputError(f"grid = {grid:g} mm makes {count:.6g} readings, and {_MOST} can be shown; take more")
+    axes = (np.arange(begin, end + 1e-9, grid) for begin, end in zip(low, high, strict=True))
     places = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
     return [_face(run.name, _left(run, path, places, 0.5 * settings["tool"]), files[0]) for run in runs]
 
@@ -140,7 +142,7 @@ def _left(run: Readings, path: Sequence[Segment], places: np.ndarray, radius: fl
             found.append([*place, tool[over, 2].min()])
     if len(found) < _LEAST:
         raise InputError(
-            f"{run.name}: {len(found)} places of the grid were cut, and a face needs {_LEAST}; a finer grid"
+            f"{run.name}: {len(found)} places of the grid were cut, and a face needs {_LEAST}; take a finer grid"
         )
     return np.array(found)
 

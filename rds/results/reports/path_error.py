@@ -112,9 +112,8 @@ def _corner_row(run: Readings, path: Sequence[Segment], i: int, turn: float) -> 
 
 
 def _finding(run: Readings, path: Sequence[Segment], feeds: Sequence[int]) -> str:
-    off = {path[i].line: float(np.abs(deviation(run.within(i), path[i])).max(initial=0.0)) for i in feeds}
-    worst = max(off, key=off.__getitem__)
-    return f"{run.name}: {off[worst] * 1e3:.1f} µm at most, in line {worst}."
+    off, worst = max((float(np.abs(deviation(run.within(i), path[i])).max(initial=0.0)), path[i].line) for i in feeds)
+    return f"{run.name}: {off * 1e3:.1f} µm at most, in line {worst}."
 
 
 def _picture(path: Sequence[Segment], feeds: Sequence[int], runs: Sequence[Readings], magnify: float) -> Picture:

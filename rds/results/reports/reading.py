@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -154,6 +154,15 @@ def without_readings_of(columns: Collection[Column], ending: str) -> list[Column
     """
     kept = [column for column in columns if not re.search(rf"_{ending}$", column.name)]
     return kept if any(column.name.lower() not in ("time", "t") for column in kept) else list(columns)
+
+
+def names_of(files: Sequence[Path]) -> list[str]:
+    """What to call each file: its name without the ending, with its folder where another has the same name."""
+    stems = [path.stem for path in files]
+    return [
+        stem if stems.count(stem) == 1 else path.with_suffix("").as_posix()
+        for stem, path in zip(stems, files, strict=True)
+    ]
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -83,12 +83,12 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
     for path in files:
         columns = read_columns(path)
         if any(column.name.lower() == "event" for column in columns):
-            found, pending = _from_events(path, columns, settings)
+            events = _events(path, columns)
+            found, pending = _changes(path, events, settings)
             tables.append(_list(path, found))
             times.setdefault("first change until ready", []).extend(change.whole for change in found)
             times.setdefault("last change until ready", []).extend(change.after_last for change in found)
-            moving = _until_moving(columns)
-            if moving:
+            if moving := _until_moving(events):
                 times.setdefault("last module plugged in until moving", []).extend(moving)
             if pending:
                 modules = ", ".join(event.module or "?" for event in pending)
@@ -112,22 +112,20 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
     )
 
 
-def _until_moving(columns: Sequence[Column]) -> list[float]:
+def _until_moving(events: Sequence[Event]) -> list[float]:
     """From the last `added` until the next `moving`, s."""
-    named = {column.name.lower(): column for column in columns}
     found, plugged = [], None
-    for value, what in zip(named["time"].numbers(), named["event"].cells.values(), strict=True):
-        if what == "added":
-            plugged = _SECONDS[named["time"].unit] * value
-        elif what == "moving" and plugged is not None:
-            found.append(_SECONDS[named["time"].unit] * value - plugged)
+    for event in events:
+        if event.what == "added":
+            plugged = event.time
+        elif event.what == "moving" and plugged is not None:
+            found.append(event.time - plugged)
             plugged = None
     return found
 
 
-def _from_events(
-    path: Path, columns: Sequence[Column], settings: Mapping[str, Any]
-) -> tuple[list[Change], list[Event]]:
+def _events(path: Path, columns: Sequence[Column]) -> list[Event]:
+    """The events of a file in the order of their times."""
     named = {column.name.lower(): column for column in columns}
     if "time" not in named:
         raise InputError(f"it has events and no column 'time'; write them as in {_EXAMPLE}", str(path))
@@ -139,6 +137,10 @@ def _from_events(
         Event(_SECONDS[time.unit] * value, what, modules.get(line, ""))
         for value, (line, what) in zip(time.numbers(), named["event"].cells.items(), strict=True)
     ]
+    return sorted(events, key=lambda event: event.time)
+
+
+def _changes(path: Path, events: Sequence[Event], settings: Mapping[str, Any]) -> tuple[list[Change], list[Event]]:
     changing = [word.strip() for word in settings["changes"].split(",") if word.strip()]
     found, pending = changes_in(events, changing, settings["ready"].strip())
     if not found:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.results.reports.content import Report, Table
-from rds.results.reports.reading import Column, columns_in, read_columns, without_readings_of
+from rds.results.reports.reading import Column, columns_in, names_of, read_columns, without_readings_of
 from rds.results.reports.settings import Setting
 from rds.results.reports.statistics import summary
 from rds.results.reports.windows import EXAMPLE, parse_windows
@@ -63,7 +64,7 @@ def to_g(readings: np.ndarray, settings: Mapping[str, Any]) -> np.ndarray:
 
 def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
     """Statistics and pictures of all files. InputError for data or options that will not do."""
-    records = [_read(path, settings) for path in files]
+    records = [_read(path, name, settings) for path, name in zip(files, names_of(files), strict=True)]
     parts = [(record, name, part) for record in records for name, part in _parts(record, settings)]
     tables = [_statistics(parts, settings["rest"])]
     if any(record.readings for record in records):
@@ -74,16 +75,12 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
         [path.name for path in files],
         settings,
         tables,
-        {f"Acceleration of {record.name}": _drawing(record, settings) for record in records},
+        {f"Acceleration of {record.name}": partial(picture, record, settings) for record in records},
         _findings(records, settings),
     )
 
 
-def _drawing(record: Vibration, settings: Mapping[str, Any]) -> Any:
-    return lambda: picture(record, settings)
-
-
-def _read(path: Path, settings: Mapping[str, Any]) -> Vibration:
+def _read(path: Path, name: str, settings: Mapping[str, Any]) -> Vibration:
     columns = [column for column in read_columns(path) if column.name.lower() not in ("time", "t")]
     columns = without_readings_of(columns, "current")  # what a module recorded beside, for the report on currents
     columns = columns_in(path, columns, ("adc", "g"), "readings of an accelerometer", "x_adc")
@@ -93,10 +90,10 @@ def _read(path: Path, settings: Mapping[str, Any]) -> Vibration:
     least = max(settings["rest"], 2)
     values = {column.name: np.asarray(column.numbers(least)) for column in columns}
     if columns[0].unit == "g":
-        return Vibration(path.stem, str(path), values, {})
+        return Vibration(name, str(path), values, {})
     for column in columns:
         _within(column, settings["bits"])
-    return Vibration(path.stem, str(path), {name: to_g(v, settings) for name, v in values.items()}, values)
+    return Vibration(name, str(path), {axis: to_g(v, settings) for axis, v in values.items()}, values)
 
 
 def _within(column: Column, bits: int) -> None:

@@ -6,10 +6,8 @@ import csv
 import io
 import re
 from base64 import b64encode
-from collections.abc import Callable
 from html import escape
 from pathlib import Path
-from typing import BinaryIO
 from urllib.parse import quote
 
 from rds.core.atomic import write_files
@@ -30,7 +28,7 @@ def write(report: Report, folder: str | Path) -> list[Path]:
         contents[folder / f"{name}.csv"] = _csv(table)
     for name, png in pictures.items():
         contents[folder / f"{report.kind}-{slug(name)}.png"] = png
-    write_files({path: _writer(content) for path, content in contents.items()})
+    write_files(contents)
     return list(contents)
 
 
@@ -92,10 +90,3 @@ def _csv(table: Table) -> bytes:
 
 def _image(png: bytes, text: str) -> str:
     return f'<img alt="{escape(text)}" src="data:image/png;base64,{b64encode(png).decode("ascii")}">'
-
-
-def _writer(content: bytes) -> Callable[[BinaryIO], None]:
-    def fill(stream: BinaryIO) -> None:
-        stream.write(content)
-
-    return fill
