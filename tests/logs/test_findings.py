@@ -170,6 +170,7 @@ def test_gaps_duplicates_and_blanks(tmp_path: Path) -> None:
     (tmp_path / "log.csv.map.toml").write_text('gaps = "split"\n' + MAP)
     first, second = read_log(tmp_path / "log.csv")
     assert (len(first), len(second), second.name) == (1000, 2990, "log part 2")
+    assert (first.first, second.first) == (0, 1000)  # rows, of which none is missing
     assert "gap" in grave(read(tmp_path, made, 'gaps = "keep"\n'))
     (tmp_path / "log.csv.map.toml").unlink()
     text = (tmp_path / "log.csv").read_text()

@@ -77,6 +77,7 @@ def axis_logs(table: Table, mapping: LogMap, about: AxisMap, second: Second | No
             sha256=table.sha256,
             findings=tuple(findings),
             clocks=_clocks(table, mapping, parts, second, base),
+            first=first,
         )
         logs.append(with_findings(log, machine_axis))
     return _without_resting(logs)
