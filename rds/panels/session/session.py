@@ -107,7 +107,7 @@ class Session:
         kept = self._read_kept()
         if kept == self._kept:
             return
-        self._kept = kept
+        self._kept = dict(kept)  # which each choice that is taken over writes anew
         for panel, choices in self._choices.items():
             defaults = {name: field.default for name, field in choices.fields.items() if "." not in name}
             choices.load(defaults | kept.get(panel, {}))
