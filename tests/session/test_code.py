@@ -184,4 +184,6 @@ def test_completion_has_the_interface_and_the_file_s_own_params(tmp_path: Path) 
     offered = {(word["after"], word["label"]): word for word in words("controller", file_params(tmp_path / "mine.py"))}
     assert offered["r", "velocity"]["detail"] == "mm/s"
     assert offered["params", "Kp"]["info"] == "V/mm, proportional gain"
+    (tmp_path / "marked.py").write_text("params = {'K': 2, 'n': 1%s}  # gain\n" % ("0" * 400), encoding="utf-8-sig")
+    assert file_params(tmp_path / "marked.py") == [("K", 2.0, "gain")]  # n is no number that can be worked with
     assert ("segment", "feed_rate") in {(each["after"], each["label"]) for each in words("interpolator", [])}
