@@ -76,7 +76,7 @@ class CodeView:
         return self.codes[self.role]
 
     def open(self, role: str, name: str) -> None:
-        """Show this file of the folder, if it is there and not shown already; one that cannot be edited here is said."""
+        """Show this file of the folder, if it is there and not shown already; say so where it cannot be edited here."""
         code = self.codes.get(role)
         if code is None or not (code.session.folder / name).is_file():
             return
