@@ -92,6 +92,17 @@ def test_a_file_that_was_replaced_is_read_again_unless_something_is_unsaved(tmp_
     assert not made.follow_disk() and made.text.text == "(mine)\nM2\n"
 
 
+def test_the_text_of_a_file_that_was_removed_stays(tmp_path: Path) -> None:
+    made = program(tmp_path)
+    made.edit("(mine)\nM2\n")
+    made.save()
+    made.text.path.unlink()
+    assert made.follow_disk() and made.text.text == "(mine)\nM2\n" and made.text.is_new
+    assert program(tmp_path).text.text == "(mine)\nM2\n"  # as a draft
+    made.save()
+    assert made.text.path.read_text() == "(mine)\nM2\n"
+
+
 def test_a_copy_takes_no_name_that_is_there(tmp_path: Path) -> None:
     (tmp_path / "other.ngc").write_text("M2\n")
     made = program(tmp_path, "(mine)", "M2")

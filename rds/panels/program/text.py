@@ -87,6 +87,11 @@ class ProgramText:
         """Say no more that the file was replaced, as it is now."""
         self._stamp = stamp(self.path)
 
+    def lost(self) -> None:
+        """The file has gone: its text is not saved any more, and kept as a draft. InputError as `edit`."""
+        self._saved = self._digest = self._stamp = None
+        self.edit(self.text)
+
     def edit(self, text: str) -> None:
         """Take the text, and keep it as a draft; InputError where it is too long or the draft cannot be written."""
         data = _data(text)
