@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 from pathlib import Path
@@ -13,8 +14,10 @@ from hypothesis import strategies as st
 from rds.core.errors import InputError
 from rds.machines import machine_names
 from rds.nc.active import Follower, modes_at
+from rds.nc.validation import Validation
 from rds.panels.interpolator.motion import MADE
 from rds.panels.program.check import Look
+from rds.panels.program.preview import _numbers
 from rds.panels.program.state import Program
 from rds.panels.program.text import ProgramText
 from rds.panels.session import Session
@@ -154,6 +157,17 @@ def test_what_leaves_the_travel_is_a_fault_and_in_the_trace(tmp_path: Path) -> N
     assert [(mark.line, mark.column) for mark in found.marks] == [(2, 4)]
     assert "5 mm beyond its travel" in found.marks[0].text
     assert found.trace.high[0] == 80.0
+
+
+def test_the_reach_has_the_units_and_the_tolerance_of_the_validator(tmp_path: Path) -> None:
+    made = Program(Session(tmp_path, "xyzac"))
+    most = {axis: made.machine.axes[axis].travel[1] for axis in "XA"}
+    reach = Validation("", "xyzac", low={"X": 0.0, "A": 0.0}, high={"X": most["X"] + 1e-9, "A": most["A"] + 1e-3})
+    shown = _numbers(Look((), reach), made)
+    assert re.findall(r"<tr><td>(.*?)</td>.*?<td>. (\w+)</td></tr>", shown) == [
+        ("X [mm]", "inside"),
+        ("A [deg]", "beyond"),
+    ]
 
 
 def test_a_cycle_time_that_can_be_reckoned_by_hand(tmp_path: Path) -> None:
