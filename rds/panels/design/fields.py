@@ -34,9 +34,8 @@ def fields(machine: Machine) -> Iterable[Field]:
     yield _pole("first", "First pole", "one of the two real poles", -40.0)
     yield _pole("second", "Second pole", "the other one", -60.0)
     yield _pole("observer", "Observer pole", "of the velocity's observer: several times as fast", OBSERVER_POLE)
-    yield Number(
-        "step", "Step", "of the reference, in the response that is shown", 1.0, unit="mm", above=0.0, high=100.0
-    )
+    tip = "in the response that is shown"
+    yield Number("step", "Step of the reference", tip, 1.0, unit="mm or °", above=0.0, high=100.0)
     for name, of in (("tau", "time constant τ"), ("K", "gain K")):
         yield Number(
             f"spread_{name}", f"± {of}", "how far it may be off, in the cloud", 10.0, unit="%", low=0.0, high=90.0
