@@ -6,17 +6,21 @@ import re
 import shutil
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.core.types import Ending
 from rds.machines import machine_names
 from rds.nc.active import Follower, modes_at
 from rds.nc.validation import Validation
 from rds.panels.interpolator.motion import MADE
+from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
+from rds.panels.program.mdi import FILE, Mdi
 from rds.panels.program.preview import _numbers
 from rds.panels.program.state import Program
 from rds.panels.program.text import ProgramText
@@ -394,3 +398,12 @@ def test_a_printed_program_needs_its_options(tmp_path: Path) -> None:
     assert found.ok, found.sentence
     assert [mark.kind for mark in found.marks] == ["warning", "warning"]
     assert "660 mm/min, is assumed" in found.marks[0].text and found.marks[0].line == 2
+
+
+def test_a_typed_line_that_was_stopped_is_not_gone_on_from(tmp_path: Path) -> None:
+    mdi = Mdi(SimpleNamespace(), program(tmp_path), lambda work: None, Notice())
+    for ending, kept in ((Ending.STOPPED, []), (Ending.DONE, ["G0 X10"])):
+        mdi._text.value = "G0 X10"
+        mdi._go()
+        mdi.ended(SimpleNamespace(file=tmp_path / FILE, error=None, result=SimpleNamespace(meta={"ending": ending})))
+        assert mdi._lines == kept
