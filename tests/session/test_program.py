@@ -21,6 +21,7 @@ from rds.panels.interpolator.motion import MADE
 from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
 from rds.panels.program.mdi import FILE, Mdi
+from rds.panels.program.offsets import Offsets
 from rds.panels.program.preview import _numbers
 from rds.panels.program.state import Program
 from rds.panels.program.text import ProgramText
@@ -407,3 +408,15 @@ def test_a_typed_line_that_was_stopped_is_not_gone_on_from(tmp_path: Path) -> No
         mdi._go()
         mdi.ended(SimpleNamespace(file=tmp_path / FILE, error=None, result=SimpleNamespace(meta={"ending": ending})))
         assert mdi._lines == kept
+
+
+@pytest.mark.parametrize(
+    ("numbers", "says"),
+    [("5220\t1\n5230\t90\n", "G54 is turned by 90°"), ("5210\t1\n5212\t7\n5220\t1\n", "shifts all systems by G92")],
+)
+def test_what_is_turned_or_shifted_is_not_touched_off(numbers: str, says: str, tmp_path: Path) -> None:
+    """The program went elsewhere then than where the tool stood."""
+    (tmp_path / "o.var").write_text(numbers)
+    with pytest.raises(InputError, match=says):
+        Offsets(tmp_path, "o.var").touch_off(1, {"X": 30.0, "Y": 20.0}, {"X": 10.0, "Y": 0.0})
+    assert (tmp_path / "o.var").read_text() == numbers
