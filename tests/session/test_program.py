@@ -107,6 +107,11 @@ def test_the_text_of_a_file_that_was_removed_stays(tmp_path: Path) -> None:
     made.text.path.unlink()
     assert made.follow_disk() and made.text.text == "(mine)\nM2\n" and made.text.is_new
     assert program(tmp_path).text.text == "(mine)\nM2\n"  # as a draft
+    made.text.path.write_text("(theirs)\nM2\n")
+    with pytest.raises(InputError, match="discard your changes to see the other's"):
+        made.save()
+    assert not made.text.is_new  # so that they can be discarded
+    made.text.path.unlink()
     made.save()
     assert made.text.path.read_text() == "(mine)\nM2\n"
 

@@ -63,7 +63,7 @@ class ProgramText:
     @property
     def is_new(self) -> bool:
         """Whether there is no such file yet."""
-        return self._saved is None
+        return self._saved is None and not self.path.exists()
 
     @property
     def changed(self) -> bool:
