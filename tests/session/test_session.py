@@ -70,6 +70,20 @@ def test_what_another_page_has_chosen_in_several_panels_is_taken_over(tmp_path: 
     assert [again.kept(panel, "x") for panel in ("one", "two")] == [2.0, 2.0]
 
 
+def test_what_another_page_has_kept_of_other_panels_is_not_written_over(tmp_path: Path) -> None:
+    def choose(page: Session, panel: str, value: float) -> None:
+        page.choices(panel, [Number("x", "X", "", 0.0)]).set("x", value)
+
+    choose(Session(tmp_path), "two", 1.0)
+    here, other = Session(tmp_path), Session(tmp_path)
+    choose(other, "two", 3.0)
+    choose(here, "one", 2.0)
+    again = Session(tmp_path)
+    assert [again.kept(panel, "x") for panel in ("one", "two")] == [2.0, 3.0]
+    here.refresh()
+    assert here.choices("two", [Number("x", "X", "", 0.0)])["x"] == 3.0
+
+
 class User:
     """Something that uses the machine."""
 

@@ -53,7 +53,6 @@ class Offsets:
         lines = [f"{number}\t{value:.6f}" for number, value in sorted(self._values.items())]
         write_whole(self.path, ("\n".join(lines) + "\n").encode())
 
-
     def _refuse_moved(self, system: int) -> None:
         """What the tool reads would be another thing than its distance from the origin."""
         turn = SYSTEMS + 20 * system + 10
