@@ -85,6 +85,8 @@ def test_a_folder_with_other_things_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("mine")
     with pytest.raises(InputError, match="other things"):
         help_pages(tmp_path)
+    with pytest.raises(InputError, match="is no folder"):
+        help_pages(tmp_path / "thesis.txt")
     assert (tmp_path / "thesis.txt").read_text() == "mine"
 
 

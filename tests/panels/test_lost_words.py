@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from rds.panels.jog import loop
 from tests.panels.conftest import App
 
 LOSES = """
@@ -72,3 +74,26 @@ def test_a_hand_that_is_not_heard_lets_go(page: Any, kind: str, label: str, most
     page.clock.run_for(5000)
     assert page.evaluate("window.tried") == most
     assert page.locator(".rds-hold-on").count() == 0
+
+
+@pytest.mark.parametrize("script, label, event", [("hold.js", "X plus", "keydown"), ("turn.js", "X forward", "click")])
+def test_a_hand_that_was_not_heard_is_given_time_to_be_heard_again(
+    new_page: Callable[..., Any], script: str, label: str, event: str
+) -> None:
+    page = new_page(400, 300)
+    page.set_content("<html></html>")
+    text = (Path(loop.__file__).parent / "static" / script).read_text(encoding="utf-8")
+    page.add_script_tag(content=text.replace("export default", "window.made ="))
+    page.evaluate("setInterval = (beat) => { window.beat = beat; }")
+    page.evaluate(
+        "made.render({ el: document.body, model: {"
+        " get: (name) => ({ axis: 'X', spindle: 'X', disabled: false, by_step: false })[name],"
+        " on: () => {}, off: () => {}, send: () => {} } })"
+    )
+    press = page.locator(f'button[aria-label="{label}"]')
+    for _ in range(2):
+        press.dispatch_event(event, {"key": "Enter"})
+        page.evaluate("beat(); beat()")
+        assert page.locator(".rds-hold-on").count() == 1
+        page.evaluate("for (let n = 0; n < 10 && document.querySelector('.rds-hold-on'); n += 1) beat()")
+        assert page.locator(".rds-hold-on").count() == 0

@@ -48,6 +48,10 @@ def test_limits_alone_change_the_machine_that_is_chosen(view: ScriptView, tmp_pa
     view.text.value = "RF02 LN6 UP50 LW-50"
     assert view._write.disabled, "what was judged is another machine"
     view.check()
+    view.state.choices.set("machine", "xyzac")
+    assert view._write.disabled
+    view.state.choices.set("machine", "mrm-mill")
+    view.check()
     view.write()
     machine = load_machine(str(tmp_path / "my-script.toml"))
     assert machine.kinematics.limits[machine.kinematics.joints.index("X")].tolist() == [-50.0, 50.0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -29,6 +30,28 @@ def test_a_good_file_is_checked_once_until_it_changes(tmp_path: Path, monkeypatc
     assert builds.check("controller", path, 0.001) is first and len(calls) == 1
     path.write_text(GOOD.replace("10.0", "20.0"))
     assert builds.check("controller", path, 0.001).ok and len(calls) == 2
+
+
+def test_a_file_is_checked_again_when_one_that_it_imports_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+    report = SimpleNamespace(reports=[], warnings=[], interfaces=["controller"])
+    monkeypatch.setattr("rds.checks.check_file", lambda *a, **k: calls.append(a) or report)
+    builds, path = Builds(), write(tmp_path, "mine.py", "import math\nfrom gains import Kp\n" + GOOD)
+    for number, text in enumerate(("", "from more import Kp\nimport mine\n", "Kp = 1.0\n"), start=1):
+        write(tmp_path, "gains.py", text)
+        for _ in range(2):
+            builds.check("controller", path, 0.001)
+        assert len(calls) == number
+    write(tmp_path, "gains.py", "from more import Kp\n")
+    write(tmp_path, "more.py", "Kp = 2.0\n")
+    builds.check("controller", path, 0.001)
+    write(tmp_path, "more.py", "Kp = 3.0\n")
+    builds.check("controller", path, 0.001)
+    write(tmp_path, "beside.py", "Kp = 3.0\n")  # which nobody imports
+    builds.check("controller", path, 0.001)
+    assert len(calls) == 5
 
 
 @pytest.mark.parametrize(

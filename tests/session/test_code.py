@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from ipywidgets import Button
 from waiting import wait_for
 
 from rds.core.errors import InputError
@@ -18,9 +20,10 @@ from rds.panels.code.file import CodeFile, code_files
 from rds.panels.code.state import Code, syntax_fault
 from rds.panels.code.templates import TEMPLATES
 from rds.panels.code.versions import FOLDER, change_sentence, changes, keep, versions
-from rds.panels.code.view import changes_html, verdict
+from rds.panels.code.view import CodeView, changes_html, verdict
 from rds.panels.equipment.build import Builds, Checked, Mark
 from rds.panels.equipment.state import Equipment
+from rds.panels.kit.ticker import Ticker
 from rds.panels.session import Session
 from rds.panels.session.file_params import file_params
 
@@ -162,6 +165,21 @@ def test_what_another_program_writes_is_never_written_over(tmp_path: Path) -> No
     path.unlink()
     file.edit(other)  # one that was deleted is there again
     assert path.read_text() == other
+    path.write_bytes(latin := "# für\n".encode("latin-1"))
+    with pytest.raises(InputError, match="is no text at byte 4"):
+        file.edit(CONTROLLER)
+    assert path.read_bytes() == latin
+
+
+def test_a_file_that_cannot_be_edited_here_is_said(tmp_path: Path) -> None:
+    view = CodeView(SimpleNamespace(ticker=Ticker()), {"controller": code(tmp_path)}, lambda *_: None, Button())
+    (tmp_path / "laws").mkdir()
+    (tmp_path / "laws" / "mine.py").write_text(CONTROLLER)
+    view.open("controller", "laws/mine.py")
+    assert view.code.file.name == "my_controller.py" and "is no name of a file in your folder" in view.said.value
+    (tmp_path / "my_controller.py").write_bytes("# für\n".encode("latin-1"))
+    view.refresh()
+    assert "is no text at byte 4" in view.said.value
 
 
 def test_versions_of_every_run_with_what_changed(tmp_path: Path) -> None:
@@ -184,4 +202,6 @@ def test_completion_has_the_interface_and_the_file_s_own_params(tmp_path: Path) 
     offered = {(word["after"], word["label"]): word for word in words("controller", file_params(tmp_path / "mine.py"))}
     assert offered["r", "velocity"]["detail"] == "mm/s"
     assert offered["params", "Kp"]["info"] == "V/mm, proportional gain"
+    (tmp_path / "marked.py").write_text("params = {'K': 2, 'n': 1%s}  # gain\n" % ("0" * 400), encoding="utf-8-sig")
+    assert file_params(tmp_path / "marked.py") == [("K", 2.0, "gain")]  # n is no number that can be worked with
     assert ("segment", "feed_rate") in {(each["after"], each["label"]) for each in words("interpolator", [])}

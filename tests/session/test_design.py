@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,8 @@ from rds.controllers import library_controller
 from rds.controllers.design import tracking_gains
 from rds.core.errors import InputError
 from rds.machines import load_machine
+from rds.panels.design.charts import charts, key_numbers
+from rds.panels.design.fields import fields
 from rds.panels.design.state import Design
 from rds.panels.session import Session
 from tests.documents import blocks
@@ -142,6 +146,21 @@ def test_written_file_answers_as_the_library_s_controller(tmp_path: Path) -> Non
 def test_names_that_are_no_file_of_the_folder(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match="name the controller's file"):
         design(tmp_path).write(name)
+
+
+def test_an_axis_that_turns_is_shown_in_its_unit(tmp_path: Path) -> None:
+    chosen = Design(Session(tmp_path, "xyzac"))
+    chosen.choices.set("axis", "A")
+    made = chosen.now()
+    assert charts(made, 1.0)[0]["y_label"] == "position [deg]"
+    assert re.search(r"left at the end</td><td.*?>[-\d.e]+ deg</td>", key_numbers(made, 1.0, None))
+
+
+def test_a_machine_without_a_position_axis_is_refused_in_words(tmp_path: Path) -> None:
+    machine = load_machine("mini-cnc")
+    alone = replace(machine, axes={"spindle": machine.axis("spindle")})
+    with pytest.raises(InputError, match="mini-cnc has no position axis"):
+        list(fields(alone))
 
 
 def test_from_a_fitted_model(tmp_path: Path) -> None:

@@ -138,6 +138,11 @@ def test_a_program_of_somebody_else_is_not_written_over(tmp_path: Path) -> None:
     assert (tmp_path / "drawing.ngc").read_text() == "M2\n"
 
 
+def test_a_program_needs_a_name(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"write one like part\.ngc"):
+        drawing(tmp_path).choices.set("program", "")
+
+
 def test_a_picture_is_taken_into_the_folder_and_traced(tmp_path: Path) -> None:
     made = drawing(tmp_path)
     made.take_picture("C:\\x\\shape.txt", BLOCK.encode())

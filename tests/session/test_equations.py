@@ -41,6 +41,11 @@ def test_the_laws_have_theirs(controller: dict[str, Any], said: str) -> None:
     assert lines(controller)["Controller of X"][0].startswith(said)
 
 
+def test_what_a_law_adds_is_told_whole() -> None:
+    assert "+ 0.2 dr̈/dt V" in lines({"name": "pid", "FF3": 0.2})["Controller of X"][0]
+    assert lines({"name": "cascade"}, "spindle")["Controller of spindle"][0] == "w_r = r rev/min"
+
+
 def test_the_tracking_law_of_a_spindle_has_its_speed() -> None:
     said = lines({"name": "tracking"}, "spindle")["Controller of spindle"]
     assert said == ["u = 8e−05 (ṙ + 19.5 (r − y)) + 0.001 r V   [rev/min]"]

@@ -158,6 +158,16 @@ def test_another_unit_is_the_same_speed(tmp_path: Path) -> None:
     assert again.choices["feed"] == panel.choices["feed"] and again.segments() == panel.segments()
 
 
+def test_feeds_of_segments_are_the_same_speed_in_another_unit(tmp_path: Path) -> None:
+    rows = [{"kind": "line", "end": [20.0, 0.0], "feed": 300.0}, {"kind": "line", "end": [30.0, 0.0]}]
+    panel, other = make(tmp_path), make(tmp_path)
+    for name, value in {"kind": "linear", "given": "several", "rows": rows, "feed_unit": "mm/s"}.items():
+        panel.choices.set(name, value)
+    assert [each.feed_rate for each in panel.segments()] == [5.0, 10.0]
+    other.session.refresh()
+    assert other.choices.values() == panel.choices.values()
+
+
 def test_long_work_ends_when_it_is_asked_to(tmp_path: Path) -> None:
     panel = make(tmp_path, kind="linear", end="150, 0", feed=600.0, period=1e-5)
     task = panel.run()

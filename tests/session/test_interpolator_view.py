@@ -147,3 +147,10 @@ def test_whom_to_send_it_to_must_be_said(tmp_path: Path) -> None:
     assert "say whom to send it to" in view.notice.value and not (tmp_path / "interpolation.csv").exists()
     with pytest.raises(InputError, match="no e-mail address"):
         view.work.choices.set("send_to", "me")
+
+
+def test_a_table_of_segments_shows_what_it_was_given(tmp_path: Path) -> None:
+    rows = [{"kind": "line", "end": [123.45678, 0.0], "feed": 123.45678}]
+    view = opened(tmp_path, kind="linear", given="several", rows=rows)
+    view.segments.add("line")
+    assert view.work.choices["rows"][0] == rows[0]

@@ -86,6 +86,16 @@ def test_steps_go_as_far_as_they_say_and_not_out_of_the_travel(jog: Jog) -> None
         jog.step("X", 1)
 
 
+def test_a_step_goes_from_where_the_axis_is_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten steps of 0.01 mm from the measured position went 0.08 mm, and ten back 0.14 mm."""
+    jog, orders = Jog(Session(tmp_path)), []
+    monkeypatch.setattr(jog, "_order", lambda **order: orders.append(order))
+    jog._hear({"measured": {"X": 0.993}, "places": {"X": 1.0}, "moving": False, "homing": ""})
+    jog.choices.set("step", "0.01")
+    jog.step("X", 1)
+    assert orders == [{"goals": [["X", 1.01]], "speed": None}]
+
+
 def test_one_hand_at_a_time_and_the_emergency_stop_ends_it(jog: Jog) -> None:
     with pytest.raises(InputError, match="in use"):
         Session(jog.session.folder).take_machine("something else", object())

@@ -50,4 +50,4 @@ def test_who_hears_that_an_axis_is_homed_has_heard_where_it_is(capsys: pytest.Ca
     jog(hand, hand.orders)
     said = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     end = said.index({"homed": ["X"]})
-    assert said[end - 1] == {"measured": {"X": 4.0}, "moving": False, "homing": ""}
+    assert said[end - 1] == {"measured": {"X": 4.0}, "places": {"X": 4.0}, "moving": False, "homing": ""}

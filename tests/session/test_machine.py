@@ -167,10 +167,12 @@ def test_modules_are_scanned_tuned_and_stepped(state: MachineState) -> None:
     state.read_tuning(saved.name)
     assert state.tuning["Kp"] == 2.5
     with pytest.raises(InputError, match="Step first"):
-        state.suggest()
+        state.suggest(4)
     with pytest.raises(InputError, match="is a tool"):
         state.step(5)
     result = done(state.step(4))
+    with pytest.raises(InputError, match="no response of module 3 yet"):
+        state.suggest(3)
     assert 3.0 < result["X_measured"][-1] - result["X_measured"][0] < 8.0
     stopped = state.step(4)
     assert "4 modules are at zero volts" in state.session.emergency_stop()

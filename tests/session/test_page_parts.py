@@ -33,6 +33,7 @@ from rds.panels.program.run import ProgramWork
 from rds.panels.program.view import RESULT, ProgramView
 from rds.panels.registry import PANELS
 from rds.panels.session import Session
+from rds.panels.session.formula import FOLDER
 from rds.panels.session.task import Task
 
 
@@ -223,6 +224,8 @@ def test_the_lanes_before_a_run_have_the_signal_that_is_chosen(tmp_path: Path) -
     assert re.findall(r"<span>(.*?)</span>", preview(model)) == ["position [mm]", "voltage [V]", "as chosen, 8 s"]
     control.choices.set("shape", "user")  # the file is not named yet, and is not run for this
     assert "polyline" not in preview(control)
+    control.choices.set("shape_file", "3*sin(t)")
+    assert "polyline" not in preview(control) and not (tmp_path / FOLDER).exists()
 
 
 def test_a_bar_says_what_goes_on_after_the_stop(tmp_path: Path) -> None:

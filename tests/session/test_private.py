@@ -23,6 +23,7 @@ from rds.bus.tools.logs import ENDINGS, LogWriter
 from rds.cli.main import app
 from rds.core.private_files import SHARED
 from rds.panels.session.claim import Claim
+from rds.panels.session.fields import Flag
 from rds.panels.session.formula import formula_file
 from rds.panels.session.saving import saving
 from rds.panels.session.session import Session
@@ -90,7 +91,7 @@ def test_a_pages_folder(open_hall: Path) -> None:
     folder = open_hall / "page"
     folder.mkdir(0o755)
     session = Session(folder)
-    session.keep()
+    session.choices("p", [Flag("f", "F", "", False)]).set("f", True)  # which is kept
     formula_file(folder, "sin(t)", 0.1, 0.01)
     with Claim(folder, "a test"), saving(folder / "runs" / "one"):
         assert {".machine.lock", "signals"} <= {path.name for path in folder.iterdir()}

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.core.types import Ending
 from rds.machines import machine_names
 from rds.nc.active import Follower, modes_at
+from rds.nc.validation import Validation
 from rds.panels.interpolator.motion import MADE
+from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
+from rds.panels.program.mdi import FILE, Mdi
+from rds.panels.program.offsets import Offsets
+from rds.panels.program.preview import _numbers
 from rds.panels.program.state import Program
 from rds.panels.program.text import ProgramText
 from rds.panels.session import Session
@@ -92,6 +100,22 @@ def test_a_file_that_was_replaced_is_read_again_unless_something_is_unsaved(tmp_
     assert not made.follow_disk() and made.text.text == "(mine)\nM2\n"
 
 
+def test_the_text_of_a_file_that_was_removed_stays(tmp_path: Path) -> None:
+    made = program(tmp_path)
+    made.edit("(mine)\nM2\n")
+    made.save()
+    made.text.path.unlink()
+    assert made.follow_disk() and made.text.text == "(mine)\nM2\n" and made.text.is_new
+    assert program(tmp_path).text.text == "(mine)\nM2\n"  # as a draft
+    made.text.path.write_text("(theirs)\nM2\n")
+    with pytest.raises(InputError, match="discard your changes to see the other's"):
+        made.save()
+    assert not made.text.is_new  # so that they can be discarded
+    made.text.path.unlink()
+    made.save()
+    assert made.text.path.read_text() == "(mine)\nM2\n"
+
+
 def test_a_copy_takes_no_name_that_is_there(tmp_path: Path) -> None:
     (tmp_path / "other.ngc").write_text("M2\n")
     made = program(tmp_path, "(mine)", "M2")
@@ -143,6 +167,17 @@ def test_what_leaves_the_travel_is_a_fault_and_in_the_trace(tmp_path: Path) -> N
     assert [(mark.line, mark.column) for mark in found.marks] == [(2, 4)]
     assert "5 mm beyond its travel" in found.marks[0].text
     assert found.trace.high[0] == 80.0
+
+
+def test_the_reach_has_the_units_and_the_tolerance_of_the_validator(tmp_path: Path) -> None:
+    made = Program(Session(tmp_path, "xyzac"))
+    most = {axis: made.machine.axes[axis].travel[1] for axis in "XA"}
+    reach = Validation("", "xyzac", low={"X": 0.0, "A": 0.0}, high={"X": most["X"] + 1e-9, "A": most["A"] + 1e-3})
+    shown = _numbers(Look((), reach), made)
+    assert re.findall(r"<tr><td>(.*?)</td>.*?<td>. (\w+)</td></tr>", shown) == [
+        ("X [mm]", "inside"),
+        ("A [deg]", "beyond"),
+    ]
 
 
 def test_a_cycle_time_that_can_be_reckoned_by_hand(tmp_path: Path) -> None:
@@ -369,3 +404,24 @@ def test_a_printed_program_needs_its_options(tmp_path: Path) -> None:
     assert found.ok, found.sentence
     assert [mark.kind for mark in found.marks] == ["warning", "warning"]
     assert "660 mm/min, is assumed" in found.marks[0].text and found.marks[0].line == 2
+
+
+def test_a_typed_line_that_was_stopped_is_not_gone_on_from(tmp_path: Path) -> None:
+    mdi = Mdi(SimpleNamespace(), program(tmp_path), lambda work: None, Notice())
+    for ending, kept in ((Ending.STOPPED, []), (Ending.DONE, ["G0 X10"])):
+        mdi._text.value = "G0 X10"
+        mdi._go()
+        mdi.ended(SimpleNamespace(file=tmp_path / FILE, error=None, result=SimpleNamespace(meta={"ending": ending})))
+        assert mdi._lines == kept
+
+
+@pytest.mark.parametrize(
+    ("numbers", "says"),
+    [("5220\t1\n5230\t90\n", "G54 is turned by 90°"), ("5210\t1\n5212\t7\n5220\t1\n", "shifts all systems by G92")],
+)
+def test_what_is_turned_or_shifted_is_not_touched_off(numbers: str, says: str, tmp_path: Path) -> None:
+    """The program went elsewhere then than where the tool stood."""
+    (tmp_path / "o.var").write_text(numbers)
+    with pytest.raises(InputError, match=says):
+        Offsets(tmp_path, "o.var").touch_off(1, {"X": 30.0, "Y": 20.0}, {"X": 10.0, "Y": 0.0})
+    assert (tmp_path / "o.var").read_text() == numbers

@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -107,6 +108,18 @@ def test_a_fault_of_the_program_is_said_and_the_machine_is_free_again(tmp_path: 
     run.start()
     assert run.wait(PATIENCE) and isinstance(run.error, RdsError) and "X900" in str(run.error)
     assert made.program.session.machine_user is None
+
+
+def test_a_result_that_cannot_be_shown_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shell = Shell(Session(tmp_path, "starmill"))
+    view = NodesView(shell, Program(shell.session))
+    run = SimpleNamespace(start=lambda: None, note="", share=None, seconds_left=None, stopping=False, real_time=False)
+    run.notes, run.done, run.stopped, run.error, run.result = [], False, False, None, object()
+    monkeypatch.setattr(view.by_nodes, "run", lambda: run)
+    view._start()
+    run.done = True
+    shell.ticker.tick()
+    assert "showing the run failed" in view.notice.value
 
 
 @pytest.mark.realtime

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from rds.panels.equipment.run import EquipmentRun
 from rds.panels.equipment.strip import StripChart, dressed
 from rds.panels.session import Session
 from rds.panels.session.kept_runs import KeptRun, State
-from rds.panels.session.run_table import NOTES, RunTable, differences
+from rds.panels.session.run_table import NOTES, RunRow, RunTable, differences
 from rds.panels.session.session import RUNS
 from rds.results import open_result
 
@@ -62,6 +63,22 @@ def test_what_differs_between_two(runs: tuple[Path, list[KeptRun]]) -> None:
     assert differences(rows[3].facts, rows[2].facts) == [("Pgain", "10", "20"), ("reference amplitude", "5", "4")]
     assert differences(rows[0].facts, rows[0].facts) == []
     assert ("code of the controller", "", "+1 −0 lines") in differences(rows[1].facts, rows[0].facts)
+
+
+def test_parameters_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    def row(K: float) -> RunRow:
+        own = {"source": "s", "params": {"K": K, "mode": K, "code": K}}
+        model = {"name": "linear-axis", "params": {"K": 1.7}}
+        meta = {"mode": "emulation", "axes": ["X"], "controller": {"X": own}, "model": {"X": model}}
+        folder = tmp_path / f"{K:g}"
+        folder.mkdir()
+        (folder / "result.json").write_text(json.dumps({"meta": meta}))
+        return RunTable(tmp_path).rows([KeptRun(folder, State.WHOLE, K)])[0]
+
+    first, second = row(5.0), row(6.0)
+    assert first.mode == "emulation" and first.facts["K of the model"] == 1.7
+    wanted = [("K", "5", "6"), ("mode of the controller", "5", "6"), ("code", "5", "6")]
+    assert differences(first.facts, second.facts) == wanted
 
 
 def test_notes_and_stars_are_kept_beside_the_runs(runs: tuple[Path, list[KeptRun]]) -> None:

@@ -13,6 +13,7 @@ import pytest
 from rds.core.errors import InputError
 from rds.modes.process.record import NAME
 from rds.panels.session import Session
+from rds.panels.session.fields import Number
 from rds.panels.session.kept_runs import State
 from rds.panels.session.task import Task
 
@@ -53,6 +54,34 @@ def test_a_task_keeps_its_error() -> None:
 
     task = Task("bad", work).start()
     assert task.wait(10) and isinstance(task.error, InputError) and not task.stopped
+
+
+def test_what_another_page_has_chosen_in_several_panels_is_taken_over(tmp_path: Path) -> None:
+    pages = [Session(tmp_path), Session(tmp_path)]
+    for page in pages:
+        for panel in ("one", "two"):
+            page.choices(panel, [Number("x", "X", "", 0.0)])
+    here, other = pages
+    for panel in ("one", "two"):
+        other.choices(panel, []).set("x", 2.0)
+    here.refresh()
+    assert [here.choices(panel, [])["x"] for panel in ("one", "two")] == [2.0, 2.0]
+    again = Session(tmp_path)
+    assert [again.kept(panel, "x") for panel in ("one", "two")] == [2.0, 2.0]
+
+
+def test_what_another_page_has_kept_of_other_panels_is_not_written_over(tmp_path: Path) -> None:
+    def choose(page: Session, panel: str, value: float) -> None:
+        page.choices(panel, [Number("x", "X", "", 0.0)]).set("x", value)
+
+    choose(Session(tmp_path), "two", 1.0)
+    here, other = Session(tmp_path), Session(tmp_path)
+    choose(other, "two", 3.0)
+    choose(here, "one", 2.0)
+    again = Session(tmp_path)
+    assert [again.kept(panel, "x") for panel in ("one", "two")] == [2.0, 3.0]
+    here.refresh()
+    assert here.choices("two", [Number("x", "X", "", 0.0)])["x"] == 3.0
 
 
 class User:

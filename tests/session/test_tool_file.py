@@ -38,6 +38,12 @@ def test_what_somebody_else_wrote_meanwhile_is_not_written_over(tmp_path: Path) 
     assert table.path.read_text() == "T7 P7 D2\n"
 
 
+def test_a_table_of_another_coding_is_not_edited(tmp_path: Path) -> None:
+    (tmp_path / "old.tbl").write_bytes("T1 P1 D6 ;Fräser\n".encode("latin-1"))
+    with pytest.raises(InputError, match="is no UTF-8 at byte 13"):
+        ToolFile(tmp_path, "old.tbl")
+
+
 @pytest.mark.parametrize("name", ["../mine.tbl", ".tbl", ".hidden.tbl", "mine.txt", "", "a/b.tbl", "a\n.tbl"])
 def test_names_that_are_none_of_the_folder_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match="no name of a tool table"):

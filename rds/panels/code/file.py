@@ -82,12 +82,7 @@ class CodeFile:
         self._open()
 
     def _open(self) -> None:
-        try:
-            self._on_disk: str | None = read(self.path)
-        except FileNotFoundError:
-            self._on_disk = None
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}", str(self.path)) from error
+        self._on_disk = self._read()
         self.is_new = self._on_disk is None
         self.text = TEMPLATES[self.role].text if self._on_disk is None else self._on_disk
 
@@ -113,17 +108,19 @@ class CodeFile:
             self._on_disk, self.is_new = self.text, False
 
     def refresh(self) -> bool:
-        """Take over what another program has written; whether it has."""
-        try:
-            now: str | None = read(self.path)
-        except (OSError, InputError):
-            now = None
-        if now is None or now == self._on_disk:  # one that was deleted is written again
-            if now is None:
-                self._on_disk = None
-            return False
-        if now == self.text:
+        """Take over what another program has written; whether it has. InputError where that cannot be edited here."""
+        now = self._read()
+        if now is None or now in (self._on_disk, self.text):  # one that was deleted is written again
             self._on_disk = now
             return False
         self._open()
         return True
+
+    def _read(self) -> str | None:
+        """What is on disk; None where there is no such file."""
+        try:
+            return read(self.path)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror}", str(self.path)) from error

@@ -10,6 +10,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
+from rds.core.errors import InputError
 from rds.panels.code.advice import told
 from rds.panels.code.editor import CodeEditor
 from rds.panels.code.state import Code
@@ -75,14 +76,18 @@ class CodeView:
         return self.codes[self.role]
 
     def open(self, role: str, name: str) -> None:
-        """Show this file of the folder, if it is there and not shown already."""
+        """Show this file of the folder, if it is there and not shown already; say so where it cannot be edited here."""
         code = self.codes.get(role)
         if code is None or not (code.session.folder / name).is_file():
             return
         if name == code.file.name and role == self.role:
             return
         if name != code.file.name:
-            code.open(name)
+            try:
+                code.open(name)
+            except InputError as error:
+                self.said.say(str(error), "error")
+                return
         if role != self.role:
             self.roles.value = role
         else:
@@ -94,11 +99,14 @@ class CodeView:
 
     def refresh(self) -> None:
         """As the files lie in the folder now."""
-        changed = self.code.file.refresh()
+        attempt("the file", self._take_over, self.said)
         self._list_files()
-        if changed:
-            self._show()
         self._list_versions()
+
+    def _take_over(self) -> None:
+        """What another program has written into the file in sight."""
+        if self.code.file.refresh():
+            self._show()
 
     def shows(self, files: Sequence[Checked]) -> bool:
         """Whether one of these has a fault, and is in sight."""

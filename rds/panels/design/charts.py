@@ -22,17 +22,17 @@ _CURVE = 400  # points of a response that are drawn
 
 
 def charts(design: TrackingDesign, size: float) -> list[Mapping[str, Any]]:
-    """Step response and its voltage, Bode's two, Nyquist's; `size` is the step in mm."""
+    """Step response and its voltage, Bode's two, Nyquist's; `size` is the step in the axis's unit."""
     w, loop = design.loop()
     return [
-        *_steps(design.step(size), design.step(size, friction=False)),
+        *_steps(design.step(size), design.step(size, friction=False), design.axis.unit),
         *_bode(w, loop),
         _nyquist(loop),
         _error(design),
     ]
 
 
-def _steps(real: StepResponse, ideal: StepResponse) -> list[Mapping[str, Any]]:
+def _steps(real: StepResponse, ideal: StepResponse, unit: str) -> list[Mapping[str, Any]]:
     every = max(1, len(real.time) // _CURVE)
     t = real.time[::every]
     goal = series([0.0, t[-1]], [real.size, real.size], "", QUIET, dash="2 3")
@@ -40,7 +40,7 @@ def _steps(real: StepResponse, ideal: StepResponse) -> list[Mapping[str, Any]]:
         {
             "title": "Step",
             "x_label": "time [s]",
-            "y_label": "position [mm]",
+            "y_label": f"position [{unit}]",
             "series": [
                 goal,
                 series(t, ideal.position[::every], "no friction", ASIDE, dash="6 3"),
@@ -130,7 +130,7 @@ def key_numbers(design: TrackingDesign, size: float, cloud: Cloud | None) -> str
         rows.append([_SHORT.get(name, meaning), f"{margins[name]:.3g}{said}", of_cloud])
     settled = "not yet" if step.settling is None else f"{step.settling:.3g} s"
     rows += [["settled within 2 %", settled, ""], ["overshoot", f"{step.overshoot:.3g} %", ""]]
-    rows += [["left at the end", f"{step.remaining:.3g} mm", ""]]
+    rows += [["left at the end", f"{step.remaining:.3g} {design.axis.unit}", ""]]
     rows += [["largest voltage", f"{float(np.abs(step.voltage).max()):.3g} V", ""]]
     return table(["", "now", "worst"], rows)
 

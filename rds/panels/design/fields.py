@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.controllers.tracking import OBSERVER_POLE, POLES
+from rds.core.errors import InputError
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.machines import Machine
 from rds.panels.session.fields import Choice, Field, Number, Text
@@ -17,8 +18,13 @@ FASTEST, SLOWEST = -1e5, -0.1  # 1/s
 
 
 def fields(machine: Machine) -> Iterable[Field]:
-    """All of them. A spindle is not among the axes: its speed is measured, so there is nothing to observe."""
+    """All of them. A spindle is not among the axes: its speed is measured, so there is nothing to observe.
+
+    InputError for a machine that has nothing else.
+    """
     axes = {name: f"{name} axis" for name, axis in machine.axes.items() if axis.unit != SPINDLE_UNIT}
+    if not axes:
+        raise InputError(f"{machine.name} has no position axis, whose poles are placed here; open a page with another")
     sources = {LIBRARY: "Machine's data", MODEL_FILE: "Fitted model"}
     yield Choice("source", "Axis from", "the machine's own data, or a model file that you fitted", LIBRARY, sources)
     yield Choice(AXIS, "Axis", "which axis of the machine", next(iter(axes)), axes)
@@ -34,9 +40,8 @@ def fields(machine: Machine) -> Iterable[Field]:
     yield _pole("first", "First pole", "one of the two real poles", -40.0)
     yield _pole("second", "Second pole", "the other one", -60.0)
     yield _pole("observer", "Observer pole", "of the velocity's observer: several times as fast", OBSERVER_POLE)
-    yield Number(
-        "step", "Step", "of the reference, in the response that is shown", 1.0, unit="mm", above=0.0, high=100.0
-    )
+    tip = "in the response that is shown"
+    yield Number("step", "Step of the reference", tip, 1.0, unit="mm or °", above=0.0, high=100.0)
     for name, of in (("tau", "time constant τ"), ("K", "gain K")):
         yield Number(
             f"spread_{name}", f"± {of}", "how far it may be off, in the cloud", 10.0, unit="%", low=0.0, high=90.0

@@ -16,7 +16,7 @@ _COLUMNS = 3
 
 
 def design_picture(design: TrackingDesign, size: float, cloud: Cloud | None) -> Picture:
-    """Poles (1/s), with those of the loop over the cloud; then the charts for a step of `size` mm."""
+    """Poles (1/s), with those of the loop over the cloud; then the charts for a step of `size` in the axis's unit."""
     shown = charts(design, size)
     rows = -(-(1 + len(shown)) // _COLUMNS)
     picture = Picture(2.7 * rows)

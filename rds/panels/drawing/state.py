@@ -124,6 +124,7 @@ def _fields(folder: Path) -> Iterable[Field]:
         "drawing.ngc",
         120,
         check_name,
+        needed=True,
     )
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
@@ -51,7 +52,7 @@ class Checked:
 
 @dataclass
 class Builds:
-    """Files that were checked. One that has not changed since is not checked again."""
+    """Files that were checked. One that has not changed since, nor what it imports beside it, is not checked again."""
 
     _kept: dict[tuple[str, Path, float, int], tuple[str, Checked]] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
@@ -67,7 +68,7 @@ class Builds:
         data = _read(path)
         if isinstance(data, str):
             return Checked(role, path, "", (Mark(None, data),))
-        digest, key = hashlib.sha256(data).hexdigest(), (role, path, T, axes)
+        digest, key = hashlib.sha256(b"\0".join(_with_imports(path, data, set()))).hexdigest(), (role, path, T, axes)
         with self._lock:
             before = self._kept.get(key)
         if before is not None and before[0] == digest:
@@ -152,6 +153,22 @@ def _line_of(message: str, source: str) -> int | None:
                 if re.match(written.format(name), line):
                     return number
     return None
+
+
+def _with_imports(path: Path, data: bytes, seen: set[str]) -> Iterator[bytes]:
+    """The file's own bytes, and those of the files beside it that it imports, in turn."""
+    yield data
+    try:
+        found = list(ast.walk(ast.parse(data)))
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # no Python, or half typed
+        return
+    names = [alias.name for each in found if isinstance(each, ast.Import) for alias in each.names]
+    names += [each.module for each in found if isinstance(each, ast.ImportFrom) and each.module and not each.level]
+    for name in sorted({each.partition(".")[0] for each in names} - seen):
+        seen.add(name)
+        beside = path.with_name(f"{name}.py")
+        if isinstance(imported := _read(beside), bytes):
+            yield from (name.encode(), *_with_imports(beside, imported, seen))
 
 
 def _read(path: Path) -> bytes | str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
+from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.modes.loop.plan import Plan
 
 
@@ -35,8 +36,9 @@ def _law(name: str, params: Mapping[str, Any], unit: str) -> list[str]:
         return [f"u = {_sum((p['Pgain'], 'e'), (p.get('bias', 0.0), ''))} V,   e = r − y [{unit}]"]
     if name == "pid" and "Pgain" in p:
         terms = [(p["Pgain"], "e"), (p["Igain"], "∫e dt"), (p["Dgain"], "ė"), (p["FF0"], "r"), (p["FF1"], "ṙ")]
+        terms += [(p["FF2"], "r̈"), (p["FF3"], "dr̈/dt"), (p["bias"], "")]
         return [
-            f"u = {_sum(*terms, (p['FF2'], 'r̈'), (p['bias'], ''))} V,   e = r − y [{unit}]",
+            f"u = {_sum(*terms)} V,   e = r − y [{unit}]",
             f"ė through 1/({_n(p['derivative_filter'])} s + 1)",
         ]
     if name == "modified-pid" and "Pgain" in p:
@@ -57,8 +59,9 @@ def _law(name: str, params: Mapping[str, Any], unit: str) -> list[str]:
             )
         return [*lines, f"v̂ from the reduced-order observer with its pole at {_n(p['observer_pole'])} 1/s"]
     if name == "cascade" and "Kpp" in p:
+        demand = f"{_sum((p['Kpp'], '(r − y)'), (p['speed_feedforward'], 'ṙ'))} {unit}/s"
         return [
-            f"w_r = {_sum((p['Kpp'], '(r − y)'), (p['speed_feedforward'], 'ṙ'))} {unit}/s",
+            f"w_r = {f'r {unit}' if unit == SPINDLE_UNIT else demand}",
             f"i = {_sum((p['Kp'], '(w_r − w)'), (p['Ki'], '∫(w_r − w) dt'), (p['Kd'], 'd(w_r − w)/dt'))} A",
         ]
     if name == "relay" and "tune_effort" in p:

@@ -49,7 +49,7 @@ OF_SPINDLE = f"{PREFIX}speed_pole"
 _COMMENT = 40  # characters of a file's comment that stand beside a field
 _FIRST_OF = {"lowest": 0.5, "highest": 20.0, "sweep": 5.0, "steps": 5}  # Hz, Hz, s
 # first values that every axis of the mini CNC can follow: (amplitude, frequency) by what is driven
-_FIRST = {"V": (2.0, 1.0), "mm": (5.0, 0.2), "°": (20.0, 0.2), SPINDLE: (200.0, 0.5)}
+_FIRST = {"V": (2.0, 1.0), "mm": (5.0, 0.2), SPINDLE: (200.0, 0.5)}
 
 
 def first_fields(kind: str, machine: Machine, kept: object = None) -> Iterable[Field]:

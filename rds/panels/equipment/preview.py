@@ -10,6 +10,7 @@ import numpy as np
 
 from rds.core.colours import QUANTITIES
 from rds.core.errors import InputError
+from rds.panels.equipment.fields import USER
 from rds.panels.equipment.state import Equipment
 from rds.references import Signal, make_signal
 
@@ -58,11 +59,11 @@ def _signal(equipment: Equipment) -> tuple[str, float]:
     No points for a path or somebody's file.
     """
     chosen = equipment.choices
+    if equipment.on_path or chosen["shape"] == USER:  # whose formula would be written as a file
+        return "", 0.0
     try:
         table = equipment.table()
         words: Mapping[str, Any] = table["signal" if equipment.kind == "model" else "reference"]
-        if "file" in words or words["kind"] in ("path", "user"):
-            return "", 0.0
         signal: Signal = make_signal(**words)
     except InputError:  # what is missing is said when it is run
         return "", 0.0

@@ -182,5 +182,7 @@ def _cache() -> Path:
 
 
 def _check_replaceable(place: Path) -> None:
+    if not place.is_dir():
+        raise InputError("is no folder; choose a new one", str(place))
     if any(place.iterdir()) and not (place / "searchindex.js").is_file():
         raise InputError("is a folder with other things in it; choose a new one", str(place))

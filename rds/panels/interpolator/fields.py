@@ -60,13 +60,14 @@ def fields() -> Iterable[Field]:
     ways = {"ccw": "Counter-clockwise", "cw": "Clockwise"}
     yield Choice("direction", "Direction", "of the arc, seen from the positive end of the third axis", "ccw", ways)
     yield Choice("plane", "Plane", "in which the arc lies", "XY", {name: name for name in PLANES})
+    yield Choice("feed_unit", "Unit of the feed rate", "", "mm/min", {unit: unit for unit in FEED_UNITS})
+    yield feed("mm/min", 600.0)
+    # after the unit of their feeds, which others are in when it changes
     yield Rows("rows", "Segments", "each begins where the one before ends", [dict(row) for row in ROWS["circular"]])
     given_by_rds = {name: name for name, each in (bundled() | bundled_paths()).items() if each.machine == "mini-cnc"}
     tip = "a part program or a path that comes with rds"
     yield Choice("bundled", "Program", tip, DEFAULT_PROGRAMS["circular"], given_by_rds)
     yield Text("program", "Part program", "a file in your folder", "", "e.g. part.ngc")
-    yield Choice("feed_unit", "Unit of the feed rate", "", "mm/min", {unit: unit for unit in FEED_UNITS})
-    yield feed("mm/min", 600.0)
     yield Number.of(SAMPLE_PERIOD, "period", "Sample period", 0.001)
     yield _method(LINE)
     yield Text("line_file", "File for lines", "a Python file with interpolate()", "", "e.g. my_interpolator.py")

@@ -96,7 +96,7 @@ class _Row(widgets.HBox):
         turn = "clockwise" if row.get("clockwise") else "counter-clockwise"
         self.turn = widgets.Dropdown(options=["counter-clockwise", "clockwise"], value=turn, tooltip="way of the arc")
         self.plane = widgets.Dropdown(options=list(PLANES), value=row.get("plane", "XY"), tooltip="plane of the arc")
-        feed = "" if row.get("feed") is None else f"{row['feed']:g}"
+        feed = "" if row.get("feed") is None else f"{row['feed']:.12g}"
         self.feed = widgets.Text(feed, placeholder="feed", tooltip=_FEED_TIP, continuous_update=False)
         away = widgets.Button(description="✕", tooltip="Remove this segment")
         away.on_click(lambda _: owner.remove(self))
@@ -136,7 +136,7 @@ class _Row(widgets.HBox):
 
 def _text(label: str, values: list[float], tip: str) -> widgets.Text:
     made = widgets.Text(
-        ", ".join(f"{value:g}" for value in values), description=label, tooltip=tip, continuous_update=False
+        ", ".join(f"{value:.12g}" for value in values), description=label, tooltip=tip, continuous_update=False
     )
     made.style.description_width = "initial"
     return made

@@ -234,9 +234,15 @@ class Interpolating:
     def _chosen(self, name: str) -> None:
         if name == "feed_unit" and self._unit != self.choices["feed_unit"]:
             unit = self.choices["feed_unit"]
-            value = self.choices["feed"] * FEED_UNITS[self._unit] / FEED_UNITS[unit]
-            self._unit = unit
-            self.choices.replace([feed(unit, float(f"{value:.10g}"))])  # the same speed in another unit
+            before, self._unit = FEED_UNITS[self._unit], unit
+
+            def same(value: float) -> float:
+                """The same speed in the other unit."""
+                return float(f"{value * before / FEED_UNITS[unit]:.10g}")
+
+            rows = [row | {"feed": same(row["feed"])} if row.get("feed") else row for row in self.choices["rows"]]
+            self.choices.replace([feed(unit, same(self.choices["feed"]))])
+            self.choices.set("rows", rows)
         if name in ("line_method", "arc_method"):
             self._fit_options()
         if name == "kind" and self.choices["bundled"] in DEFAULT_PROGRAMS.values():

@@ -87,7 +87,7 @@ def jog(hand: Hand, orders: Orders) -> None:
             report_at = now + 1.0 / REPORTS
             if (age := orders.late()) is not None:
                 _say({"late": age})
-            _report(measured, wanted is not None or not reference.rests)
+            _report(measured, reference.places, wanted is not None or not reference.rests)
         due += hand.period
         left = due - time.monotonic()
         if left > 0.0:
@@ -109,7 +109,7 @@ def _home(hand: Hand, orders: Orders) -> list[str]:
         places[axis] = position
         if time.monotonic() >= report_at:
             report_at = time.monotonic() + 1.0 / REPORTS
-            _report(places, True, homing=axis)
+            _report(places, places, True, homing=axis)
 
     with contextlib.suppress(NotWanted):
         hand.home(methods, watch)
@@ -124,12 +124,12 @@ def _introduce(hand: Hand, orders: Orders) -> Reference:
     reference = Reference(hand, measured)
     orders.axes, orders.spindles, orders.places = dict(hand.axes), dict(hand.spindles), reference.places
     _say({"travel": {name: axis.travel for name, axis in hand.axes.items()}, "left_out": hand.left_out})
-    _report(measured, False)
+    _report(measured, reference.places, False)
     return reference
 
 
-def _report(measured: Mapping[str, float], moving: bool, homing: str = "") -> None:
-    _say({"measured": dict(measured), "moving": moving, "homing": homing})
+def _report(measured: Mapping[str, float], places: Mapping[str, float], moving: bool, homing: str = "") -> None:
+    _say({"measured": dict(measured), "places": dict(places), "moving": moving, "homing": homing})
 
 
 def _say(words: dict[str, Any]) -> None:

@@ -77,6 +77,7 @@ class Jog:
         self.spindles = jog_spindles(self.machine)
         self.choices = session.choices("jog", _fields(self.axes, self.spindles))
         self.positions: dict[str, float] = {}
+        self._places: dict[str, float] = {}  # where the axes are held, of which what is measured is some counts off
         self.speeds: dict[str, float] = {}
         self.left_out: dict[str, str] = {}
         self.dialect = ""
@@ -239,8 +240,8 @@ class Jog:
             self._order(halt=True)
 
     def step(self, axis: str, direction: int) -> None:
-        """Move by the step chosen. InputError where that leaves the travel."""
-        self.go(axis, self.positions.get(axis, 0.0) + direction * float(self.choices["step"]))
+        """Move by the step chosen, from where the axis is held. InputError where that leaves the travel."""
+        self.go(axis, self._places.get(axis, 0.0) + direction * float(self.choices["step"]))
 
     def go(self, axis: str, goal: float, speed: float | None = None) -> None:
         """Move to a position, at `speed` or that which is chosen. InputError where it is out of the travel."""
@@ -343,7 +344,7 @@ class Jog:
         elif "homed" in words:
             self.homed |= set(words["homed"])
         else:
-            measured = words["measured"]
+            measured, self._places = words["measured"], words["places"]
             self.positions = {name: measured[name] for name in self.axes if name in measured}
             self.speeds = {name: measured[name] for name in self.spindles if name in measured}
             self.moving, self.homing = bool(words["moving"]), str(words["homing"])

@@ -101,7 +101,7 @@ class ControllersView:
 
     def suggest(self) -> None:
         """Gains by table 11."""
-        gains = self.state.suggest()
+        gains = self.state.suggest(self._number())
         self.notice.say(f"{_words(gains)}: press Set to use them", "good")
 
     def save(self) -> None:

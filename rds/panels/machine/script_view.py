@@ -65,8 +65,10 @@ class ScriptView:
         head = Html("<p>From the tool (LN1) to the work (the last link); # is what the link's joint changes.</p>")
         self.widget = columns(side, [self.notice, head, self.text, self._found, self._figure])
         self._write.disabled = True
+        self._of = ""  # the machine at Modules with which the script was judged
         self.notice.say(_EMPTY)
         self.choices.watch(self._changed)
+        state.choices.watch(lambda name: self._of_another_machine())
 
     def take(self) -> None:
         """Begin with the script of the machine that is chosen."""
@@ -81,6 +83,7 @@ class ScriptView:
         if not self.text.value.strip():
             self.notice.say(_EMPTY)
             return
+        self._of = self.state.choices["machine"]
         machine = machine_of_script(read_script(self.text.value), "machine", self._before())
         found = verdict(machine)
         self._write.disabled = not found.ok
@@ -122,4 +125,9 @@ class ScriptView:
         if name == "script" and self.text.value != self.choices["script"]:
             self.text.value = self.choices["script"]
         if name in ("script", "rest"):  # what was judged is another machine
+            self._write.disabled = True
+
+    def _of_another_machine(self) -> None:
+        """What was judged with the machine at Modules is another one with another machine there."""
+        if self.choices["rest"] == "machine" and self._of != self.state.choices["machine"]:
             self._write.disabled = True

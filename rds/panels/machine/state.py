@@ -53,6 +53,7 @@ class MachineState:
         self.rows: list[dict[str, Any]] = []
         self.data: dict[int, dict[str, Any]] = {}
         self.response: Result | None = None
+        self._responded = 0  # the module whose response that is
         self._server: subprocess.Popen[bytes] | None = None
         self._task: Task[Any] | None = None
         self._end: weakref.finalize[Any, Any] | None = None
@@ -216,16 +217,20 @@ class MachineState:
                     settled=settled,
                     progress=lambda done, of: task.advance(abs(done), abs(of), f"the axis has gone {done} counts"),
                 )
+            self._responded = number
             return self.response
 
         return self._work(f"step of module {number}", act)
 
-    def suggest(self) -> Mapping[str, float]:
-        """Gains by Ziegler and Nichols from the last step, put into the fields. InputError where they cannot be had."""
+    def suggest(self, number: int) -> Mapping[str, float]:
+        """Gains by Ziegler and Nichols from the last step, put into the fields.
+
+        InputError where they cannot be had, or that step was another module's.
+        """
         from rds.bus.modules.oacs.tuning import gains_from_step
 
-        if self.response is None:
-            raise InputError("there is no response yet: press Step first")
+        if self.response is None or self._responded != number:
+            raise InputError(f"there is no response of module {number} yet: press Step first")
         gains = gains_from_step(self.response, self.response.axes[0], self.tuning["controller"])._asdict()
         for name, value in gains.items():
             self.tuning.set(name, float(f"{value:.6g}"))

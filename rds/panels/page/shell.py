@@ -147,8 +147,8 @@ class Shell:
             self.on_help(self.help_page)
 
     def _show_messages(self) -> None:
-        heard, self._heard[:] = list(self._heard), []
-        for message in heard:
+        while self._heard:  # one that another thread says meanwhile is not lost
+            message = self._heard.pop(0)
             self.say(message.text, message.kind)
 
     def _tell_channels(self) -> None:

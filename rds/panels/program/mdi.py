@@ -8,6 +8,7 @@ import ipywidgets as widgets
 
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
+from rds.core.types import Ending
 from rds.panels.kit.button import run_order
 from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
@@ -25,7 +26,7 @@ _WORDS = (
 
 
 class Mdi:
-    """`ended(work, moved)` is due when a run that `run(work)` was asked for is over."""
+    """`ended(work)` is due when a run that `run(work)` was asked for is over."""
 
     def __init__(self, shell: object, program: Program, run: Callable[[ProgramWork], None], notice: Notice):
         self._program, self._run, self._notice = program, run, notice
@@ -39,12 +40,12 @@ class Mdi:
         self._show()
 
     def ended(self, work: ProgramWork) -> None:
-        """Keep the line of a run that went well; one that moves nothing holds, too."""
+        """Keep the line of a run that came to its end, which the next one goes on from; one that moves nothing, too."""
         if work.file.name != FILE or not self._tried:
             return
         tried, self._tried = self._tried, ""
         moves_nothing = isinstance(work.error, InputError) and "nothing moves from line" in str(work.error)
-        if work.error is None or moves_nothing:
+        if moves_nothing or (work.result is not None and work.result.meta.get("ending") == Ending.DONE):
             self._lines.append(tried)
             self._text.value = ""
         if moves_nothing:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from html import escape
 from typing import Any
 
 import ipywidgets as widgets
 
 from rds.panels.equipment.result_actions import report_link
-from rds.panels.kit.button import is_free, run_order, say_error
+from rds.panels.kit.button import attempt, is_free, run_order, say_error
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.html import Html
@@ -73,7 +74,7 @@ class NodesView:
         run.start()
         self._run = run
         self._clear()
-        self.bar.follow(run, lambda: self._ended(run))
+        self.bar.follow(run, lambda: attempt("showing the run", partial(self._ended, run), self.notice))
 
     def _ended(self, run: NodesRun) -> None:
         if run.stopped:

@@ -9,7 +9,7 @@ from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import SYSTEMS as WORDS
-from rds.nc.language.parameters import SYSTEM, SYSTEMS, read_parameters
+from rds.nc.language.parameters import G92, G92_APPLIED, SYSTEM, SYSTEMS, read_parameters
 
 FIRST = "offsets.var"  # the file that is begun where none is chosen
 _AXES = "XYZ"
@@ -40,7 +40,11 @@ class Offsets:
         return rows
 
     def touch_off(self, system: int, machine: Mapping[str, float], reads: Mapping[str, float]) -> None:
-        """Let the tool, which is at `machine` (mm, by axis), read `reads` (mm) in a system from now on; saved."""
+        """Let the tool, which is at `machine` (mm, by axis), read `reads` (mm) in a system from now on; saved.
+
+        InputError where an axis's position is missing, or the file turns the system or shifts all of them (G92).
+        """
+        self._refuse_moved(system)
         for axis, value in reads.items():
             if axis not in machine:
                 raise InputError(f"the position of {axis} on the machine is not known; give it")
@@ -48,6 +52,20 @@ class Offsets:
         self._values.setdefault(SYSTEM, 1.0)
         lines = [f"{number}\t{value:.6f}" for number, value in sorted(self._values.items())]
         write_whole(self.path, ("\n".join(lines) + "\n").encode())
+
+    def _refuse_moved(self, system: int) -> None:
+        """What the tool reads would be another thing than its distance from the origin."""
+        turn = SYSTEMS + 20 * system + 10
+        if self._values.get(turn, 0.0):
+            raise InputError(
+                f"{WORDS[system]} is turned by {self._values[turn]:g}° in {self.path.name} (parameter {turn}): use "
+                f"another system, or set {turn} to 0 in the file"
+            )
+        if self._values.get(G92_APPLIED) and any(self._values.get(G92 + axis) for axis in range(3)):
+            raise InputError(
+                f"{self.path.name} shifts all systems by G92 (parameters {G92} on): set {G92_APPLIED} to 0 in the "
+                "file, or use another file"
+            )
 
 
 def _number(system: int, axis: str) -> int:

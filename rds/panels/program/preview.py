@@ -8,6 +8,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
+from rds.nc.validate import TOLERANCE
 from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
@@ -79,10 +80,9 @@ def _numbers(look: Look, program: Program) -> str:
         for axis, low in look.validation.low.items():
             high, of = look.validation.high[axis], program.machine.axes.get(axis)
             least, most = of.travel if of is not None else (0.0, 0.0)
-            inside = of is not None and least <= low and high <= most
-            rows.append(
-                [axis, f"{low:.3f}", f"{high:.3f}", f"{least:g} to {most:g}", "✔ inside" if inside else "✖ beyond"]
-            )
-        heads = ["axis", "least [mm]", "greatest [mm]", "travel [mm]", ""]
+            inside = of is not None and least - TOLERANCE <= low and high <= most + TOLERANCE
+            place, verdict = f"{axis} [{of.unit if of is not None else 'mm'}]", "✔ inside" if inside else "✖ beyond"
+            rows.append([place, f"{low:.3f}", f"{high:.3f}", f"{least:g} to {most:g}", verdict])
+        heads = ["axis", "least", "greatest", "travel", ""]
         parts.append(html.table(heads, rows, "Reach, machine coordinates"))
     return "".join(parts)

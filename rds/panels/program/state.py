@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -202,9 +203,18 @@ class Program:
         self.choices.set("file", other.name)
 
     def follow_disk(self) -> bool:
-        """Read the file again where somebody else wrote it and nothing here is unsaved; whether that was so."""
+        """Read the file again where somebody else wrote it and nothing here is unsaved; whether that was so.
+
+        The text of a file that was removed stays.
+        """
         if self.text.changed or not self.text.replaced:
             return False
+        if not self.text.path.exists():
+            with contextlib.suppress(InputError):  # a folder that has gone as well
+                self.text.lost()
+            self.session.say(f"{self.text.name} was removed by somebody else; Save writes it again", "warning")
+            self.look_again()
+            return True
         try:
             self.text = self._file(self.text.name)
         except InputError as error:

@@ -85,6 +85,7 @@ class StepView:
             else:
                 self.notice.say(f"{MOST} lines were executed; press again to go on", "note")
         except RdsError as error:
+            self._steps = None  # it ends at its fault, and not as a program that is over
             said = str(error).replace(str(text.on_disk()), text.name)
             raise InputError(said) from error
         finally:

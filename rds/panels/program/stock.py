@@ -116,7 +116,7 @@ def block_of(text: str) -> tuple[list[float], list[float]]:
         corners = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
         corners = []
-    if len(corners) != 6:
+    if len(corners) != 6 or not np.isfinite(corners).all():
         raise InputError(f"the stock {text!r:.60} is not six numbers: X Y Z of its lower and of its upper corner, mm")
     if not all(b > a for a, b in zip(corners[:3], corners[3:], strict=True)):
         raise InputError(f"the stock {text!r:.60} has no volume; write its lower corner first, then the upper one")

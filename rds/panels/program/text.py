@@ -63,7 +63,7 @@ class ProgramText:
     @property
     def is_new(self) -> bool:
         """Whether there is no such file yet."""
-        return self._saved is None
+        return self._saved is None and not self.path.exists()
 
     @property
     def changed(self) -> bool:
@@ -86,6 +86,11 @@ class ProgramText:
     def accept(self) -> None:
         """Say no more that the file was replaced, as it is now."""
         self._stamp = stamp(self.path)
+
+    def lost(self) -> None:
+        """The file has gone: its text is not saved any more, and kept as a draft. InputError as `edit`."""
+        self._saved = self._digest = self._stamp = None
+        self.edit(self.text)
 
     def edit(self, text: str) -> None:
         """Take the text, and keep it as a draft; InputError where it is too long or the draft cannot be written."""

@@ -102,4 +102,10 @@ class ToolFile:
             raise InputError(f"cannot be read: {error.strerror}", str(self.path)) from error
         if len(data) > LARGEST:
             raise InputError(f"is larger than {LARGEST >> 20} MB; that is no tool table to edit here", str(self.path))
-        return data.decode("utf-8-sig", "replace").replace("\r\n", "\n")
+        try:
+            return data.decode("utf-8-sig").replace("\r\n", "\n")
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"is no UTF-8 at byte {error.start + 1}, which would be lost here; save it as UTF-8 to edit it",
+                str(self.path),
+            ) from error

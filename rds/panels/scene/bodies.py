@@ -43,16 +43,14 @@ def _of_links(machine: Machine) -> dict[str, Any]:
     for link in machine.links:
         chain = frames[link.name]
         color = TABLE if link.name in works else HEAD
-        carried = link.parent
         if link.axis and chain.joints:
             joint, rail = chain.joints[-1], f"rail of {link.name}"
-            frames[rail] = Chain((*chain.fixed[:-2], chain.fixed[-2]), chain.joints[:-1])
+            frames[rail] = Chain(chain.fixed[:-1], chain.joints[:-1])
             least, most = machine.axes[link.axis].travel
             solids.append(_rail(rail, joint, least, most, size))
             arms.append((link.parent, rail, 0.05 * size, FRAME))
-            carried = rail
-        if carried == link.parent or not link.axis:
-            arms.append((carried, link.name, 0.05 * size, FRAME))
+        else:
+            arms.append((link.parent, link.name, 0.05 * size, FRAME))
         solids.append(_box(link.name, (0.1 * size, 0.1 * size, 0.06 * size), (0.0, 0.0, 0.0), color))
     arms.append((machine.tool.link if machine.tool else machine.links[-1].name, TIP, 0.04 * size, HEAD))
     arms.append((machine.work.link if machine.work else BED, ZERO, 0.05 * size, TABLE))

@@ -30,9 +30,8 @@ def file_params(path: Path) -> list[FileParam]:
     try:
         with path.open("rb") as stream:
             source = stream.read(LARGEST)
-        text = source.decode("utf-8", "replace")
-        body = ast.parse(text).body
-        comments = _comments(text)
+        body = ast.parse(source).body  # as Python reads it: a byte order mark, and a coding that the file names
+        comments = _comments(source)
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError, tokenize.TokenError):
         return []
     found: list[FileParam] = []
@@ -61,12 +60,13 @@ def _number(value: ast.expr) -> float | None:
     """The value, where it is written out as a number."""
     try:
         number = ast.literal_eval(value)
-    except (ValueError, TypeError, SyntaxError, RecursionError, MemoryError):
+        is_number = isinstance(number, int | float) and not isinstance(number, bool)
+        return float(number) if is_number else None
+    except (ValueError, TypeError, SyntaxError, OverflowError, RecursionError, MemoryError):
         return None
-    return number if isinstance(number, int | float) and not isinstance(number, bool) else None
 
 
-def _comments(text: str) -> dict[int, str]:
+def _comments(source: bytes) -> dict[int, str]:
     """The comment of each line that has one."""
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    tokens = tokenize.tokenize(io.BytesIO(source).readline)
     return {each.start[0]: each.string.lstrip("#").strip() for each in tokens if each.type == tokenize.COMMENT}

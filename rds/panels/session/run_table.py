@@ -22,6 +22,8 @@ NOTES = "notes.json"
 CHOICES = "choices.json"  # of a run that a panel began: the words of its experiment
 LONGEST = 200  # characters of a note
 _MOST_CHANGES = 3  # that a row names
+_CODE = "code of the "  # what the names of facts that are a source begin with
+_PARTS = ("mode", "controller", "model")  # facts that a parameter of the same name is not to be taken for
 # of the experiment's words: what the result itself tells, and what no run is compared by
 _LEFT_OUT = ("machine", "bus", "controller", "model", "mode", "axis", "axes", "duration", "sample_period")
 
@@ -162,9 +164,9 @@ def differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[tuple[str, s
         one, other = a.get(key), b.get(key)
         if one == other:
             continue
-        if key.startswith("code") and isinstance(one, str) and isinstance(other, str):
+        if key.startswith(_CODE) and isinstance(one, str) and isinstance(other, str):
             found.append((key, "", change_sentence(one, other)))
-        elif not key.startswith("code"):
+        elif not key.startswith(_CODE):
             text = _complex if key.rpartition(" ")[2] == "poles" else _text
             found.append((key, text(one), text(other)))
     return found
@@ -172,7 +174,7 @@ def differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[tuple[str, s
 
 def code_of(row: RunRow) -> dict[str, str]:
     """The source of each of the user's files that the run had, by what it is."""
-    return {key: str(value) for key, value in row.facts.items() if key.startswith("code")}
+    return {key: str(value) for key, value in row.facts.items() if key.startswith(_CODE)}
 
 
 def _facts(head: Mapping[str, Any]) -> dict[str, Any]:
@@ -193,16 +195,23 @@ def _facts(head: Mapping[str, Any]) -> dict[str, Any]:
             of = f" {axis}" if len(parts) > 1 else ""
             facts[f"{role}{of}"] = own.get("name")
             if own.get("source"):
-                facts[f"code of the {role}{of}"] = own["source"]
+                facts[f"{_CODE}{role}{of}"] = own["source"]
             if isinstance(own.get("params"), Mapping) and (own.get("source") or role not in choices):
                 # what was worked out of the axis's data is no choice: the words of the experiment say what was
-                facts |= {f"{name}{of}": value for name, value in own["params"].items() if _is_plain(value)}
+                facts |= {
+                    f"{_param(role, name)}{of}": value for name, value in own["params"].items() if _is_plain(value)
+                }
     if isinstance(own := choices.get("controller"), Mapping):
-        facts |= {key: value for key, value in _flat(own, " ") if key not in ("name", "file")}
+        facts |= {key: value for key, value in _flat(own, " ") if key not in ("name", "file", *_PARTS)}
     facts |= {key: value for key, value in _flat(choices) if key not in facts}
     if changes := meta.get("changes"):
         facts["changed while it ran"] = len(changes)
     return facts
+
+
+def _param(role: str, name: str) -> str:
+    """What a parameter is called among the facts: the controller's by its name, the model's may have the same."""
+    return f"{name} of the {role}" if role == "model" or name in _PARTS else name
 
 
 def _flat(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:

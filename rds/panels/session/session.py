@@ -85,7 +85,7 @@ class Session:
             made = Choices(fields)
             for sentence in made.load(self._kept.get(panel, {})):
                 self.say(f"{panel}: {sentence}; the default was taken", "warning")
-            made.watch(lambda name: self.keep())
+            made.watch(lambda name: self.keep(panel))
             self._choices[panel] = made
         return self._choices[panel]
 
@@ -93,9 +93,14 @@ class Session:
         """The value of a panel's choice as it was kept in this folder, unchecked; None where it was not."""
         return self._kept.get(panel, {}).get(name)
 
-    def keep(self) -> None:
-        """Write all choices to the folder; a folder that cannot be written to is said once, and nothing else breaks."""
-        self._kept |= {panel: choices.values() for panel, choices in self._choices.items()}
+    def keep(self, panel: str) -> None:
+        """Write the choices of a panel to the folder, beside what any page has kept of others.
+
+        A folder that cannot be written to is said once, and nothing else breaks.
+        """
+        with contextlib.suppress(OSError, ValueError, RecursionError):  # what cannot be read is written anew
+            self._kept |= _kept_in(self.folder / KEPT)
+        self._kept[panel] = self._choices[panel].values()
         try:
             write_whole(self.folder / KEPT, json.dumps(self._kept, indent=1, default=str).encode())
         except InputError as error:
@@ -105,9 +110,7 @@ class Session:
     def refresh(self) -> None:
         """Take over the choices that another page of this folder has kept since, and defaults where none is kept."""
         kept = self._read_kept()
-        if kept == self._kept:
-            return
-        self._kept = kept
+        self._kept = dict(kept)  # which each choice that is taken over writes anew
         for panel, choices in self._choices.items():
             defaults = {name: field.default for name, field in choices.fields.items() if "." not in name}
             choices.load(defaults | kept.get(panel, {}))
@@ -115,15 +118,12 @@ class Session:
     def _read_kept(self) -> dict[str, dict[str, Any]]:
         path = self.folder / KEPT
         try:
-            kept = json.loads(path.read_text())
+            return _kept_in(path)
         except FileNotFoundError:
             return {}
         except (OSError, ValueError, RecursionError) as error:
             self.say(f"{path} cannot be read ({error}); panels begin with their defaults", "warning")
             return {}
-        if not isinstance(kept, dict):
-            return {}
-        return {panel: values for panel, values in kept.items() if isinstance(values, dict)}
 
     # messages
 
@@ -316,3 +316,11 @@ class Session:
     def runs_that_go_on(self) -> list[KeptRun]:
         """The runs of this folder that any page or terminal has going now."""
         return runs_that_go_on(self.folder / RUNS)
+
+
+def _kept_in(path: Path) -> dict[str, dict[str, Any]]:
+    """The choices in a file, by panel. OSError, ValueError or RecursionError where it cannot be read."""
+    kept = json.loads(path.read_text())
+    if not isinstance(kept, dict):
+        return {}
+    return {panel: values for panel, values in kept.items() if isinstance(values, dict)}

@@ -25,6 +25,7 @@ function render({ model, el }) {
       unheard += 1;
       model.send({ kind: "hold", direction, answer: held.answer });
     };
+    unheard = 0; // what was lost before is of another press
     const timer = setInterval(() => (button.disabled || unheard >= UNHEARD ? release() : say()), BEAT);
     held = { button, timer, say, answer: null }; // the last answer that was heard
     button.classList.add("rds-hold-on");

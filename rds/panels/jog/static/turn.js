@@ -21,6 +21,7 @@ function render({ model, el }) {
   const turn = (button, direction) => {
     if (turning !== null && turning.direction === direction) return;
     forget();
+    unheard = 0; // what was lost before is of another order
     const say = () => {
       unheard += 1;
       model.send({ kind: "turn", direction, answer: turning.answer });

@@ -37,8 +37,9 @@ function render({ el }) {
     const nav = app.querySelector(".rds-nav");
     if (nav) { set(nav, "role", "toolbar"); set(nav, "aria-label", "Panels"); }
     for (const each of app.querySelectorAll(".rds-nav button")) set(each, "tabindex", each.matches(".rds-here") ? "0" : "-1");
-    for (const [what, name] of [[".rds-progress [role=progressbar], .rds-progress .progress", "progress"]]) {
-      for (const each of app.querySelectorAll(what)) { set(each, "role", "progressbar"); set(each, "aria-label", name); }
+    for (const each of app.querySelectorAll(".rds-progress [role=progressbar], .rds-progress .progress")) {
+      set(each, "role", "progressbar");
+      set(each, "aria-label", "progress");
     }
   };
   const press = (which) => [...app.querySelectorAll(which)].find((each) => each.offsetParent && !each.disabled);
