@@ -119,7 +119,7 @@ class AxisModule:
                 return [*self.expire(at), self.latch_emergency(at)]
             elif identifier == motion_frames.SETPOINTS and not self._frame:
                 return self._set_point(data, at)
-            elif identifier == motion_frames.DATA and data[0] == self.node:
+            elif identifier == motion_frames.DATA and len(data) > 2 and data[0] == self.node:
                 self.by_itself.data(data[1], data[2:], at)
         except MachineError as error:
             LOG.warning("module %s ignored a frame: %s", self.name, error)
