@@ -52,10 +52,11 @@ class Counters(contracts.Counters):
 class _Module(drivers_base.Module):
     """A module of the cyclic frames, and the order of its answers."""
 
-    __slots__ = ("doubtful", "order")
+    __slots__ = ("axis", "doubtful", "order")
 
     def __init__(self, axis: Axis):
         super().__init__(f"{axis.name} (node {axis.node})", axis.resolution, absolute=axis.unit == "rev/min")
+        self.axis = axis
         self.order = AnswerOrder()
         self.doubtful: Answer | None = None  # since the last tick: to a tick before, or to this one after a lost one
 
