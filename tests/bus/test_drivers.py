@@ -19,6 +19,7 @@ from rds.bus.modules.calling import find_machine
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.drivers import AxisDrivers
 from rds.bus.modules.rds.frames import Answer, Kind, Status
+from rds.bus.modules.rds.module import AxisModule
 from rds.bus.modules.rds.server import serve
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
@@ -289,6 +290,29 @@ def test_other_frames_are_ignored_and_counted(puppet: tuple[Puppet, AxisDrivers]
     bus.answers = [[report, *foreign, answer(65531, 1)]]
     assert drivers.exchange() == [0.001]
     assert (drivers.counters.watchdogs, drivers.counters.foreign) == (1, 2)
+
+
+class Wired(Puppet):
+    """A bus with the module of axis X, which does not get the first set-up."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.module = AxisModule(SLOW.axis("X"), 0, SLOW.sample_period, time.monotonic())
+        self.set_ups = 0
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self.set_ups += msg.arbitration_id == frames.SETUP
+        if msg.arbitration_id != frames.SETUP or self.set_ups > 1:
+            answers = self.module.receive(msg.arbitration_id, msg.data, time.monotonic())
+            self.inbox += [can.Message(arbitration_id=0x22, data=data, is_extended_id=False) for data in answers]
+
+
+def test_a_set_up_that_was_lost_is_sent_again() -> None:
+    with Wired() as bus:
+        drivers = AxisDrivers(SLOW, ["X"], bus=bus)
+        drivers.start()
+        drivers.exchange()
+        assert bus.set_ups == 2
 
 
 def test_the_server_says_what_is_wrong(program: Callable[..., Any]) -> None:
