@@ -315,6 +315,30 @@ def test_a_set_up_that_was_lost_is_sent_again() -> None:
         assert bus.set_ups == 2
 
 
+class Moving(Puppet):
+    """A bus on which X is at these counts in turn."""
+
+    def __init__(self, *counts: int):
+        super().__init__()
+        self.counts, self.ticks = counts, 0
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        if msg.arbitration_id == frames.COMMAND:
+            self.ticks += 1
+            self.inbox.append(answer(self.ticks, self.counts[self.ticks % len(self.counts)]))
+
+
+def test_a_run_begins_with_axes_that_stand(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rds.bus.modules.drivers_base._LONGEST_COAST", 0.1)
+    with Moving(7, 8, 7, 7) as bus:  # between two counts
+        AxisDrivers(MACHINE, ["X"], bus=bus).start()
+        assert bus.ticks < 40
+    with Moving(7, 12, 9, 4, 10) as bus:  # a fine encoder
+        AxisDrivers(MACHINE, ["X"], bus=bus).start()
+    with Moving(*range(0, 2000, 2)) as bus, pytest.raises(MachineError, match=r"X \(node 2\).*did not come to rest"):
+        AxisDrivers(MACHINE, ["X"], bus=bus).start()
+
+
 def test_the_server_says_what_is_wrong(program: Callable[..., Any]) -> None:
     for arguments, code, words in (
         (["nonsense"], 2, "no machine 'nonsense'"),
