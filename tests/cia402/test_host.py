@@ -361,6 +361,12 @@ def test_a_refused_object_names_itself(machine: Machine, served: Served) -> None
     with drivers(machine, channel, ["X"], cia402=table) as host, pytest.raises(MachineError) as told:
         host.start()
     assert "0x605A:00 = 99" in str(told.value) and "too high" in str(told.value)
+    table = {"axis": {"X": {"write": [[0x6072, 0, 70_000]]}}}
+    with (
+        drivers(machine, channel, ["X"], cia402=table) as host,
+        pytest.raises(InputError, match=r"0x6072:00 = 70000 does not fit into the 16 bits"),
+    ):
+        host.start()
 
 
 def test_scan(served: Served) -> None:
