@@ -77,11 +77,13 @@ def made(channel: str, folder: Path, operator: Operator | None = None, **wishes:
 def test_a_drive_out_of_the_box_is_made_ready(served: Served, tmp_path: Path) -> None:
     channel, nodes = served("X")
     operator = Operator(direction=-1)
-    found = made(channel, tmp_path, operator, distance=20)
+    found = made(channel, tmp_path, operator, distance=20, keep_in_drive=True)
     assert (found.choices.mode, found.choices.counts, found.choices.direction) == ("csp", 1000.0, -1)
     assert 20 <= found.motion.moved < 200 and found.motion.agrees and 1 <= (found.motion.torque or 0) <= 100
     assert found.motion.increments == found.motion.moved
     assert nodes[0].drive.objects.values[0x6072, 0] == 1000  # written back
+    nodes[0].drive.objects.reset()  # what it has kept: not the limit of the first motion
+    assert nodes[0].drive.objects.values[0x6072, 0] == 1000
     table = tomllib.loads(experiment_text(found.choices, "bench.toml", {"channel": channel}))
     assert table["bus"]["cia402"]["axis"]["X"] == {"node": 2, "counts": 1000.0, "direction": -1}
 
@@ -125,8 +127,9 @@ def test_a_device_that_is_no_drive_is_refused_and_not_said_to_be_missing(tmp_pat
 
 @pytest.mark.realtime
 def test_limits_at_zero_are_written_before_each_run(served: Served, tmp_path: Path) -> None:
-    channel, _ = served("X", quirks="zero-limits")
+    channel, nodes = served("X", quirks="zero-limits")
     found = made(channel, tmp_path, distance=20)
+    assert nodes[0].drive.objects.values[0x6072, 0] == 1000
     assert (0x6072, 0, 1000) in found.choices.write and {entry[0] for entry in found.choices.write} == {0x6072, 0x607D}
     written = experiment_text(found.choices, "bench.toml", {})
     assert tomllib.loads(written)["bus"]["cia402"]["axis"]["X"]["write"][0] == [0x6072, 0, 1000]
