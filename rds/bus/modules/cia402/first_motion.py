@@ -125,14 +125,14 @@ class _Bench:
         self.look(0.0)
         moved = self.at - start
         sign = 1 if moved > 0 else -1
-        delay = self._back(-given * volts, start, sign)
+        delay = self._back(given, torque, volts, start, sign)
         return self._told(moved, given, sign > 0, delay)
 
-    def _back(self, command: float, start: int, sign: int) -> int | None:
+    def _back(self, given: float, torque: int, volts: float, start: int, sign: int) -> int | None:
         """Push it back to where it stood; the samples until the first count."""
         before, delay = self.at, None
         for k in range(round(_RISE / self.period)):
-            now = self.cycle(command * min(1.0 + k * self.period, 1.5))
+            now = self.cycle(-volts * min(given * (1.0 + k * self.period), 1.5 * given, torque))
             if delay is None and (before - now) * sign > 0:
                 delay = k
             if (now - start) * sign <= 0:
