@@ -280,7 +280,9 @@ def _move(
 ) -> FirstMotion:
     distance = options.distance / choices.counts
     pushes = not choices.fixed_mapping and _has_torque(bus, choices.node)
-    how = f"by a torque that rises to {options.torque} ‰ at most" if pushes else "by its position loop"
+    how = f"by a torque that rises to {options.torque} ‰ at most"
+    if not pushes:
+        how = "by its velocity loop" if choices.mode == "csv" else "by its position loop"
     if not operator.agree(
         f"switch the power on and move {choices.axis} by {options.distance} counts ({distance:.3g} {choices.unit}) and "
         f"back, {how}; the axis must be free, and a hand on the emergency stop"
