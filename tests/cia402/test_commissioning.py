@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from rds import Experiment
 from rds.bus.modules.cia402 import first_motion
-from rds.bus.modules.cia402.commissioned import experiment_text
+from rds.bus.modules.cia402.commissioned import Choices, experiment_text, machine_text
 from rds.bus.modules.cia402.commissioning import Commissioned, CommissioningOptions, Declined, commission
 from rds.bus.modules.cia402.examination import Units, gear_finding
 from rds.bus.modules.cia402.identity import Identity, check_eds, keep_eds, kept_eds
@@ -144,6 +144,54 @@ def test_a_mapping_that_cannot_be_changed_is_used_as_it_is(served: Served, tmp_p
         MachineError, match=r"no RPDO with the controlword and the target 0x6071.*RPDO 3: 0x6040:00, 0x607A"
     ):
         made(channel, tmp_path, mode="cst")
+
+
+@pytest.mark.realtime
+def test_a_drive_that_takes_speeds_alone_is_moved_by_a_speed(served: Served, tmp_path: Path) -> None:
+    channel, _ = served("X", quirks="fixed-mapping")
+    operator = Operator()
+    found = made(channel, tmp_path, operator, distance=20, mode="csv")
+    assert found.choices.mode == "csv" and found.motion.torque is None
+    assert found.motion.moved == pytest.approx(20, abs=10) and any("by its velocity loop" in it for it in operator.said)
+
+
+class OneWay:
+    """Drivers of an axis that 40 ‰ move one way, and nothing moves back; what they were told, V."""
+
+    def __init__(self) -> None:
+        self.drives = [type("Drive", (), {"node": 2, "enabled": True})]
+        self.told: dict[tuple[int, int], bytes] = {}
+        self.written: list[float] = [0.0]
+        self.at = 0.0
+
+    def exchange(self) -> list[float]:
+        self.at += 0.05 * (self.written[-1] > 0.4)
+        return [self.at]
+
+    def write(self, targets: list[float]) -> None:
+        self.written += targets
+
+    def ask_for(self, drive: object, index: int) -> None:
+        """Nothing answers."""
+
+
+def test_the_way_back_of_the_first_motion_keeps_to_its_torque(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(first_motion, "_RISE", 0.3)
+    monkeypatch.setattr(first_motion, "_REST", 0.01)
+    drivers = OneWay()
+    found = first_motion._Bench(drivers, 1000.0, 0.001).pushed(40, 50, 0.01)  # type: ignore[arg-type]
+    assert found.moved >= 40 and min(drivers.written) >= -0.5  # V: 50 ‰
+
+
+def test_names_that_are_no_bare_keys_are_quoted_in_the_files(tmp_path: Path) -> None:
+    choices = Choices('mill "1"', "Achse Ä", "mm", (-5.0, 5.0), 0.002, "csp", 2, 1000.0)
+    path = tmp_path / "machine.toml"
+    path.write_text(machine_text(choices, "node 2: Servo\r\n\x07"), encoding="utf-8")
+    machine = load_machine(str(path))
+    assert machine.name == 'mill "1"' and list(machine.axes) == ["Achse Ä"]
+    table = tomllib.loads(experiment_text(choices, 'mill "1".toml', {}))
+    assert table["axis"] == "Achse Ä" and table["bus"]["cia402"]["axis"]["Achse Ä"]["node"] == 2
+    assert table["machine"] == 'mill "1".toml'
 
 
 def test_a_no_ends_it_and_takes_back_what_was_changed(served: Served, tmp_path: Path) -> None:
