@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -66,6 +67,12 @@ def test_a_dry_run_moves_nothing(served: Server, drivers: Callable[..., DcsDrive
         assert cycle(d, [5.0, 5.0, 5.0], 20) == [0.0, 0.0, 0.0]
     finally:
         d.close()
+
+
+def test_a_converter_beyond_what_a_frame_carries_is_refused_at_the_start() -> None:
+    machine = load_machine("starmill")
+    with pytest.raises(InputError, match="its converter gives 12 V, and a frame on a serial line carries 10 V"):
+        DcsDrivers(replace(machine, converter=replace(machine.converter, range=12.0)))
 
 
 def test_a_second_host_is_refused(served: Server, drivers: Callable[..., DcsDrivers]) -> None:
