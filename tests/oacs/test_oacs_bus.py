@@ -224,9 +224,7 @@ def test_a_host_that_is_killed_leaves_nothing_moving(serve: Serve, bus: can.BusA
     assert Module(bus, 4).stop().counts < 100 * 169 / 4
 
 
-def test_the_cyclic_exchange(
-    serve: Serve, bus: can.BusABC, channel: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_cyclic_exchange(serve: Serve, bus: can.BusABC, channel: str, monkeypatch: pytest.MonkeyPatch) -> None:
     serve()
     opened, plain = [], can.Bus
     monkeypatch.setattr(can, "Bus", lambda *given, **options: opened.append(given) or plain(*given, **options))
