@@ -17,7 +17,7 @@ from rds.core.toml_text import toml_text
 from rds.machines.configuration import Check, Verdict, verdict
 from rds.machines.library import LibraryModule, by_type_text, library_module, told_module
 from rds.machines.link_modules import said_by_link
-from rds.machines.link_table import BED, path_to
+from rds.machines.link_table import path_to
 from rds.machines.machine import MACHINE, Axis, Machine, load_machine, machine_from, machine_names
 from rds.machines.module_table import CARRIES_ON, MOUNTED_BY
 from rds.machines.mounting import SPEED, chosen_motion, chosen_spindle, mounted, with_zero
@@ -57,8 +57,7 @@ def first_order(data: Mapping[int, Data]) -> list[int | str]:
 def order_of(machine: Machine, data: Mapping[int, Data]) -> list[int | str] | None:
     """The order that a machine's links say, of these modules; None if one of them is none of the machine's."""
     links = {link.name: link for link in machine.links}
-    ends = [end.link if end else usual for end, usual in ((machine.tool, [*links, ""][-1]), (machine.work, BED))]
-    to_tool, to_work = ([*path_to(links, end)] for end in ends)
+    to_tool, to_work = (path_to(links, end.link) if end else [] for end in (machine.tool, machine.work))
     carrying = [name for name in to_tool if name in to_work]
     names = [name for name in reversed(to_tool) if name not in carrying[:-1]]
     order: list[int | str] = []

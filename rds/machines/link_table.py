@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rds.core.errors import InputError
 from rds.core.quantities import Choice, Items, Quantity, Table, Tables, Text, near
@@ -202,20 +202,3 @@ def path_to(links: Mapping[str, Link], end: str) -> list[str]:
         found.append(end)
         end = links[end].parent
     return found[::-1]
-
-
-def links_as_tables(links: tuple[Link, ...]) -> list[dict[str, Any]]:
-    """The links as `[[link]]` tables, for toml_text; what is as by default is left out."""
-    made = []
-    for link in links:
-        table: dict[str, Any] = {"name": link.name, "parent": link.parent}
-        for key in ("module", "axis", "joint", "interface", "parent_interface"):
-            table |= {key: getattr(link, key)} if getattr(link, key) else {}
-        table |= {"sign": link.sign} if link.sign != 1 else {}
-        for key in ("matrix", "angles", "offset", "limits"):
-            value = getattr(link, key)
-            table |= {key: [list(r) if isinstance(r, tuple) else r for r in value]} if value is not None else {}
-        for key in ("error_angles", "error_offset"):
-            table |= {key: list(getattr(link, key))} if any(getattr(link, key)) else {}
-        made.append(table)
-    return made

@@ -59,7 +59,7 @@ MODULE = Table(
         "counterclockwise_speed": _not_negative("full speed counter-clockwise", "axis unit per min"),
         "supply": _not_negative("supply voltage of the motor driver", "V"),
         "overtravel": _not_negative("way beyond the travel at which the switch opens", "axis unit"),
-        "debounce": _not_negative("time for which a switch is ignored after it moved", "s"),
+        "debounce": _not_negative("how long a switch is open or closed until that counts", "s"),
         "response_call": _not_negative("time until it answers a call", "s"),
         "response_download": _not_negative("time until it answers a download", "s"),
         "current_start": _not_negative("current of the motor while it starts", "A"),

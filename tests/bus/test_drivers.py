@@ -19,6 +19,7 @@ from rds.bus.modules.calling import find_machine
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.drivers import AxisDrivers
 from rds.bus.modules.rds.frames import Answer, Kind, Status
+from rds.bus.modules.rds.module import AxisModule
 from rds.bus.modules.rds.server import serve
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
@@ -289,6 +290,53 @@ def test_other_frames_are_ignored_and_counted(puppet: tuple[Puppet, AxisDrivers]
     bus.answers = [[report, *foreign, answer(65531, 1)]]
     assert drivers.exchange() == [0.001]
     assert (drivers.counters.watchdogs, drivers.counters.foreign) == (1, 2)
+
+
+class Wired(Puppet):
+    """A bus with the module of axis X, which does not get the first set-up."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.module = AxisModule(SLOW.axis("X"), 0, SLOW.sample_period, time.monotonic())
+        self.set_ups = 0
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self.set_ups += msg.arbitration_id == frames.SETUP
+        if msg.arbitration_id != frames.SETUP or self.set_ups > 1:
+            answers = self.module.receive(msg.arbitration_id, msg.data, time.monotonic())
+            self.inbox += [can.Message(arbitration_id=0x22, data=data, is_extended_id=False) for data in answers]
+
+
+def test_a_set_up_that_was_lost_is_sent_again() -> None:
+    with Wired() as bus:
+        drivers = AxisDrivers(SLOW, ["X"], bus=bus)
+        drivers.start()
+        drivers.exchange()
+        assert bus.set_ups == 2
+
+
+class Moving(Puppet):
+    """A bus on which X is at these counts in turn."""
+
+    def __init__(self, *counts: int):
+        super().__init__()
+        self.counts, self.ticks = counts, 0
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        if msg.arbitration_id == frames.COMMAND:
+            self.ticks += 1
+            self.inbox.append(answer(self.ticks, self.counts[self.ticks % len(self.counts)]))
+
+
+def test_a_run_begins_with_axes_that_stand(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rds.bus.modules.drivers_base._LONGEST_COAST", 0.1)
+    with Moving(7, 8, 7, 7) as bus:  # between two counts
+        AxisDrivers(MACHINE, ["X"], bus=bus).start()
+        assert bus.ticks < 40
+    with Moving(7, 12, 9, 4, 10) as bus:  # a fine encoder
+        AxisDrivers(MACHINE, ["X"], bus=bus).start()
+    with Moving(*range(0, 2000, 2)) as bus, pytest.raises(MachineError, match=r"X \(node 2\).*did not come to rest"):
+        AxisDrivers(MACHINE, ["X"], bus=bus).start()
 
 
 def test_the_server_says_what_is_wrong(program: Callable[..., Any]) -> None:

@@ -6,7 +6,7 @@ from math import exp
 
 import pytest
 
-from rds.bus.modules.rds import frames
+from rds.bus.modules.rds import frames, motion_frames
 from rds.bus.modules.rds.frames import Answer, Kind, Status
 from rds.bus.modules.rds.module import AxisModule, machine_parameters
 from rds.core.errors import InputError
@@ -44,6 +44,25 @@ def test_takes_its_own_slot() -> None:
     module.receive(frames.COMMAND, command(9.0, 9.0, -4.0, 9.0), 100.0)
     module.motion.advance(100.001)
     assert module.motion.voltage == pytest.approx(-4.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("volts", [5.0, 24.0])
+def test_by_itself_it_gives_up_to_the_range_of_the_converter(volts: float) -> None:
+    module = AxisModule(AXIS, 0, T, 0.0, range=volts)
+    module.control(motion_frames.encode_gain(2, motion_frames.Gain.FORWARD, 30.0), 0.0)
+    module.control(motion_frames.encode_begin(2, motion_frames.Buffer.NONE, 0), 0.0)
+    module.receive(motion_frames.SETPOINTS, motion_frames.encode_setpoints([16]), 0.0)
+    module.motion.advance(0.001)
+    assert module.motion.voltage == volts
+
+
+@pytest.mark.parametrize("data", [b"", b"\x02", b"\x02\x00"])
+def test_a_piece_of_a_buffer_without_bytes_changes_nothing(data: bytes) -> None:
+    module = make()
+    module.control(motion_frames.encode_begin(2, motion_frames.Buffer.INCREMENTS, 0), 100.0)
+    assert module.receive(motion_frames.DATA, data, 100.0) == []
+    _, told = module.control(bytes([motion_frames.Verb.INQUIRE, 2]), 100.0) or (0, b"")
+    assert motion_frames.decode_progress(told).wanted == 0
 
 
 def test_a_dry_run_answers_and_does_not_move() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
 import can
@@ -10,9 +11,14 @@ import pytest
 from typer.testing import CliRunner
 
 from rds.bus.hub.faults import Faults
+from rds.bus.modules.calling import find_machine
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.frames import Answer
+from rds.bus.tools.scan import _cyclic
 from rds.bus.tools.traffic import refuse_taken
 from rds.cli.main import app
 from rds.core.errors import MachineError
+from rds.machines import load_machine
 
 Opener = Callable[..., can.BusABC]
 
@@ -52,3 +58,31 @@ def test_a_quiet_bus_and_a_few_frames_of_others_are_not(open_bus: Opener, bitrat
         other.send(can.Message(arbitration_id=0x700, is_extended_id=False, data=b"\x05"))
     refuse_taken(listening)
     refuse_taken(listening, 0.05)
+
+
+class Answering(can.BusABC):
+    """A bus on which a call of all modules is answered by these frames."""
+
+    def __init__(self, *answers: can.Message):
+        self.answers, self.inbox = answers, list[can.Message]()
+        super().__init__("answering")
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        if (msg.arbitration_id, bytes(msg.data)) == (frames.CALL, b""):
+            self.inbox += self.answers
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        if not self.inbox:
+            time.sleep(timeout or 0.0)
+        return self.inbox.pop(0) if self.inbox else None, True
+
+
+def test_an_error_frame_and_a_short_frame_are_no_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their identifiers say what went wrong: 0x024 is no acknowledgement, told by the controller."""
+    answer = can.Message(arbitration_id=0x023, is_extended_id=False, data=frames.encode_answer(Answer(0, 0, 1, 0)))
+    error = can.Message(arbitration_id=0x024, is_extended_id=False, is_error_frame=True, dlc=8, data=bytes(8))
+    short = can.Message(arbitration_id=0x022, is_extended_id=False, data=b"\x01")
+    found = _cyclic(lambda: Answering(error, short, answer), {})
+    assert [row["id"] for row in found] == [3]
+    monkeypatch.setattr("rds.bus.modules.calling.open_bus", lambda *_, **__: Answering(error))
+    assert find_machine(load_machine("mini-cnc"), timeout=0.02) == []

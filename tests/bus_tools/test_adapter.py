@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import signal
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import cast
 from uuid import uuid4
 
@@ -19,10 +21,11 @@ from can.interfaces.slcan import slcanBus
 from typer.testing import CliRunner
 from waiting import wait_for
 
+from rds.bus.modules.bus_node import BusTime
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.drivers import AxisDrivers
 from rds.bus.modules.rds.server import serve
-from rds.bus.modules.shared_bus import opener_of
+from rds.bus.modules.shared_bus import SharedInterface, opener_of
 from rds.bus.tools.adapter import AdapterFailure
 from rds.bus.tools.link import bus_failed, open_bus
 from rds.bus.tools.slcan_adapter import SlcanAdapter
@@ -265,6 +268,37 @@ def test_the_modules_on_one_adapter_hear_each_other(channel: str) -> None:
             second.recv(5.0)
         with pytest.raises(MachineError, match="can't be opened"):
             opener([0x10])
+
+
+def test_a_module_that_was_held_up_has_every_frame_and_is_not_behind_afterwards(channel: str) -> None:
+    shared = SharedInterface(lambda: can.Bus(interface="virtual", channel=channel), "shared")
+    with shared.end([0x10]) as module, shared.end() as other:
+        for number in range(1000):
+            other.send(message(0x10, number.to_bytes(2, "big")))
+        heard = [module.recv(0.0) for _ in range(1000)]
+        assert [int.from_bytes(each.data, "big") for each in heard if each is not None] == list(range(1000))
+        assert module.recv(0.0) is None and not select.select([module], [], [], 0.0)[0]
+        other.send(message(0x10, b"\x07"))
+        last = module.recv(0.0)
+        assert last is not None and bytes(last.data) == b"\x07"
+        assert last.timestamp == 0.0, "none: the adapter's stamps are of a clock that nobody here has"
+
+
+def test_bus_time_goes_on_from_where_it_was_when_the_clock_of_the_stamps_is_set() -> None:
+    clock = BusTime()
+    before = clock.at(1000.0)
+    assert clock.at(1000.25) - before == pytest.approx(0.25, abs=1e-6)
+    for stamp in (5000.0, 1.7e9, 3.0, 0.0):
+        assert before < clock.at(stamp) < before + 60.0
+
+
+def test_bus_time_is_that_of_the_stamps_however_late_frames_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    local = SimpleNamespace(time=lambda: 1.7e9, monotonic=lambda: 0.0)
+    monkeypatch.setattr("rds.bus.modules.bus_node.time", local)
+    clock = BusTime()
+    at = clock.at(1.7e9)
+    local.monotonic = lambda: 5.0  # it was held up for so long, and nothing came for nearly as long
+    assert [clock.at(1.7e9 + later) - at for later in (0.25, 4.5)] == [0.25, 4.5]
 
 
 def test_own_frames_that_an_interface_gives_back_are_dropped() -> None:

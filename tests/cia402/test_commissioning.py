@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from rds import Experiment
 from rds.bus.modules.cia402 import first_motion
-from rds.bus.modules.cia402.commissioned import experiment_text
+from rds.bus.modules.cia402.commissioned import Choices, experiment_text, machine_text
 from rds.bus.modules.cia402.commissioning import Commissioned, CommissioningOptions, Declined, commission
 from rds.bus.modules.cia402.examination import Units, gear_finding
 from rds.bus.modules.cia402.identity import Identity, check_eds, keep_eds, kept_eds
@@ -77,11 +77,13 @@ def made(channel: str, folder: Path, operator: Operator | None = None, **wishes:
 def test_a_drive_out_of_the_box_is_made_ready(served: Served, tmp_path: Path) -> None:
     channel, nodes = served("X")
     operator = Operator(direction=-1)
-    found = made(channel, tmp_path, operator, distance=20)
+    found = made(channel, tmp_path, operator, distance=20, keep_in_drive=True)
     assert (found.choices.mode, found.choices.counts, found.choices.direction) == ("csp", 1000.0, -1)
     assert 20 <= found.motion.moved < 200 and found.motion.agrees and 1 <= (found.motion.torque or 0) <= 100
     assert found.motion.increments == found.motion.moved
     assert nodes[0].drive.objects.values[0x6072, 0] == 1000  # written back
+    nodes[0].drive.objects.reset()  # what it has kept: not the limit of the first motion
+    assert nodes[0].drive.objects.values[0x6072, 0] == 1000
     table = tomllib.loads(experiment_text(found.choices, "bench.toml", {"channel": channel}))
     assert table["bus"]["cia402"]["axis"]["X"] == {"node": 2, "counts": 1000.0, "direction": -1}
 
@@ -125,8 +127,9 @@ def test_a_device_that_is_no_drive_is_refused_and_not_said_to_be_missing(tmp_pat
 
 @pytest.mark.realtime
 def test_limits_at_zero_are_written_before_each_run(served: Served, tmp_path: Path) -> None:
-    channel, _ = served("X", quirks="zero-limits")
+    channel, nodes = served("X", quirks="zero-limits")
     found = made(channel, tmp_path, distance=20)
+    assert nodes[0].drive.objects.values[0x6072, 0] == 1000
     assert (0x6072, 0, 1000) in found.choices.write and {entry[0] for entry in found.choices.write} == {0x6072, 0x607D}
     written = experiment_text(found.choices, "bench.toml", {})
     assert tomllib.loads(written)["bus"]["cia402"]["axis"]["X"]["write"][0] == [0x6072, 0, 1000]
@@ -141,6 +144,54 @@ def test_a_mapping_that_cannot_be_changed_is_used_as_it_is(served: Served, tmp_p
         MachineError, match=r"no RPDO with the controlword and the target 0x6071.*RPDO 3: 0x6040:00, 0x607A"
     ):
         made(channel, tmp_path, mode="cst")
+
+
+@pytest.mark.realtime
+def test_a_drive_that_takes_speeds_alone_is_moved_by_a_speed(served: Served, tmp_path: Path) -> None:
+    channel, _ = served("X", quirks="fixed-mapping")
+    operator = Operator()
+    found = made(channel, tmp_path, operator, distance=20, mode="csv")
+    assert found.choices.mode == "csv" and found.motion.torque is None
+    assert found.motion.moved == pytest.approx(20, abs=10) and any("by its velocity loop" in it for it in operator.said)
+
+
+class OneWay:
+    """Drivers of an axis that 40 ‰ move one way, and nothing moves back; what they were told, V."""
+
+    def __init__(self) -> None:
+        self.drives = [type("Drive", (), {"node": 2, "enabled": True})]
+        self.told: dict[tuple[int, int], bytes] = {}
+        self.written: list[float] = [0.0]
+        self.at = 0.0
+
+    def exchange(self) -> list[float]:
+        self.at += 0.05 * (self.written[-1] > 0.4)
+        return [self.at]
+
+    def write(self, targets: list[float]) -> None:
+        self.written += targets
+
+    def ask_for(self, drive: object, index: int) -> None:
+        """Nothing answers."""
+
+
+def test_the_way_back_of_the_first_motion_keeps_to_its_torque(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(first_motion, "_RISE", 0.3)
+    monkeypatch.setattr(first_motion, "_REST", 0.01)
+    drivers = OneWay()
+    found = first_motion._Bench(drivers, 1000.0, 0.001).pushed(40, 50, 0.01)  # type: ignore[arg-type]
+    assert found.moved >= 40 and min(drivers.written) >= -0.5  # V: 50 ‰
+
+
+def test_names_that_are_no_bare_keys_are_quoted_in_the_files(tmp_path: Path) -> None:
+    choices = Choices('mill "1"', "Achse Ä", "mm", (-5.0, 5.0), 0.002, "csp", 2, 1000.0)
+    path = tmp_path / "machine.toml"
+    path.write_text(machine_text(choices, "node 2: Servo\r\n\x07"), encoding="utf-8")
+    machine = load_machine(str(path))
+    assert machine.name == 'mill "1"' and list(machine.axes) == ["Achse Ä"]
+    table = tomllib.loads(experiment_text(choices, 'mill "1".toml', {}))
+    assert table["axis"] == "Achse Ä" and table["bus"]["cia402"]["axis"]["Achse Ä"]["node"] == 2
+    assert table["machine"] == 'mill "1".toml'
 
 
 def test_a_no_ends_it_and_takes_back_what_was_changed(served: Served, tmp_path: Path) -> None:

@@ -18,7 +18,9 @@ from waiting import wait_for
 from rds.bus.modules.cia402.codes import Nmt, State
 from rds.bus.modules.cia402.host import Cia402Drivers
 from rds.bus.modules.cia402.node import DriveNode
+from rds.bus.modules.cia402.remote import Remote
 from rds.bus.modules.cia402.scan import scan
+from rds.bus.modules.cia402.settings import read_settings
 from rds.core.errors import InputError, MachineError
 from rds.machines import Machine
 
@@ -238,6 +240,34 @@ def test_a_drive_that_dies_is_told(machine: Machine, served: Served) -> None:
                 cycle(host, 0.0)
 
 
+def test_the_power_of_a_drive_that_stays_in_its_quick_stop_goes_though_another_one_is_lost(
+    machine: Machine, served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rds.bus.modules.cia402.host._STOPPING", 0.2)
+    channel, nodes = served("X", "Y")
+    staying = {"write": [[0x605A, 0, 6], [0x6007, 0, 0]]}  # and the silence of the host is not its business
+    table = {"heartbeat": 5.0, "mode": "csp", "axis": {"Y": staying}}
+    with drivers(machine, channel, ["X", "Y"], cia402=table) as host:
+        host.start()
+        powered(host, 0.0, 0.0)
+        nodes[0].close()
+        nodes[0]._retry_at = float("inf")
+        with pytest.raises(MachineError, match=r"no answer from X \(node 2\)"):
+            for _ in range(2 * PATIENCE):
+                cycle(host, 0.0, 0.0)
+    wait_for(lambda: nodes[1].drive.state is State.SWITCH_ON_DISABLED and no_voltage(nodes))
+
+
+@pytest.mark.parametrize("volts", [0.21, 12.0, 48.7])
+def test_the_largest_voltage_is_a_target_whatever_its_last_bit(machine: Machine, volts: float) -> None:
+    (drive,) = read_settings({"axis": {"X": {"rated_voltage": volts}}}, machine, ["X"]).drives
+    remote = Remote(drive)
+    assert [remote.aim(-volts), remote.aim(volts)] == pytest.approx([-volts, volts]) and remote.target == 1000
+    for bad in (1.001 * volts, float("nan"), -float("inf")):
+        with pytest.raises(InputError, match="must be from"):
+            remote.aim(bad)
+
+
 def test_a_missing_heartbeat_is_told(machine: Machine, served: Served) -> None:
     channel, nodes = served("X")
     with drivers(machine, channel, ["X"], cia402={"heartbeat": 0.2}) as host:
@@ -331,6 +361,12 @@ def test_a_refused_object_names_itself(machine: Machine, served: Served) -> None
     with drivers(machine, channel, ["X"], cia402=table) as host, pytest.raises(MachineError) as told:
         host.start()
     assert "0x605A:00 = 99" in str(told.value) and "too high" in str(told.value)
+    table = {"axis": {"X": {"write": [[0x6072, 0, 70_000]]}}}
+    with (
+        drivers(machine, channel, ["X"], cia402=table) as host,
+        pytest.raises(InputError, match=r"0x6072:00 = 70000 does not fit into the 16 bits"),
+    ):
+        host.start()
 
 
 def test_scan(served: Served) -> None:

@@ -45,11 +45,6 @@ def test_every_law_has_its_source():
         assert force_law(name).source
 
 
-def test_the_feed_for_a_force_is_the_inverse():
-    law = force_law("aluminium-6061")
-    assert law.force(2.0, 40.0, law.feed_for(75.0, 2.0, 40.0)) == pytest.approx(75.0)
-
-
 def made_up(rng, n, noise=0.02):
     given = {"depth": rng.uniform(0.5, 4, n), "speed": rng.uniform(20, 200, n), "feed": rng.uniform(0.02, 0.4, n)}
     force = 850.0 * given["depth"] ** 0.95 * given["speed"] ** -0.08 * given["feed"] ** 0.7

@@ -9,11 +9,9 @@ import pytest
 from machines.machine_text import link, machine
 
 from rds.core.errors import InputError
-from rds.core.toml_text import toml_text
-from rds.machines import load_machine, machine_names
+from rds.machines import load_machine
 from rds.machines.kinematics.transform import numbers_of, transformation
 from rds.machines.library import library
-from rds.machines.link_table import links_as_tables
 
 
 def test_a_link_is_equation_1() -> None:
@@ -45,23 +43,6 @@ def test_the_thesis_s_chain_is_the_product_of_its_matrices() -> None:
     expected = turned @ shift(x, 0, -111) @ shift(-54.5, 0, z) @ shift(-370, 0, 0) @ shift(-75, 0, -81.5)
     got = load_machine("mrmt-oacs").kinematics.forward({"X": 20.0, "Z": -40.0, "A": 30.0})
     np.testing.assert_allclose(got, expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", machine_names())
-def test_links_are_written_as_they_are_read(name: str, tmp_path: Path) -> None:
-    own = load_machine(name)
-    if not own.links:
-        return
-    body = Path(own.path).read_text(encoding="utf-8").split("[[link]]")[0]
-    end = "".join(
-        f'\n[{key}]\nlink = "{at.link}"\noffset = {list(at.offset)}\n'
-        for key, at in (("tool", own.tool), ("work", own.work))
-        if at
-    )
-    path = tmp_path / "again.toml"
-    path.write_text(body + toml_text({"link": links_as_tables(own.links)}) + end, encoding="utf-8")
-    again, q = load_machine(str(path)).kinematics, own.kinematics.random(20)
-    np.testing.assert_allclose(again.forward(q), own.kinematics.forward(q), atol=1e-12)
 
 
 def test_an_assembly_error_is_added_to_the_numbers(tmp_path: Path) -> None:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import time
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
+import can
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -16,11 +19,11 @@ from rds.bus.modules.rds.frames import COMMAND, EMERGENCY, GENERAL, SETUP, encod
 from rds.bus.modules.rds.module import AxisModule
 from rds.bus.modules.rds.motion_frames import Buffer, MotionStatus, Progress, Verb
 from rds.bus.modules.rds.motion_host import MotionHost
-from rds.bus.modules.rds.motion_port import VirtualCan
+from rds.bus.modules.rds.motion_port import CanPort, VirtualCan
 from rds.cli.main import app
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
-from rds.nc.run.can_methods import can_gains, check_room, run_can_method
+from rds.nc.run.can_methods import _carry_out, can_gains, check_room, run_can_method
 from rds.nc.run.serial_methods import MethodRun
 from rds.nc.run.serial_motion import SerialMotion, serial_motion
 
@@ -49,6 +52,17 @@ def test_every_method_makes_the_same_part(runs: dict[str, MethodRun]) -> None:
         assert np.sqrt(np.mean(run.error**2)) * 1e3 < 6.0, name
     difference = np.abs(runs["A"].position[200:-5] - runs["C"].position[200:-5]).max()
     assert difference < 0.01  # mm: the same set points, at instants of the host or of the modules
+
+
+def test_method_a_tells_each_module_its_set_points_in_its_own_slot(motion: SerialMotion) -> None:
+    slots = dict(zip(CNC.axes, (3, 1, 2, 4), strict=True))
+    machine = replace(CNC, axes={name: replace(axis, slot=slots[name]) for name, axis in CNC.axes.items()})
+    modules = {name: AxisModule(axis, machine.slots[name], T, 0.0) for name, axis in machine.axes.items()}
+    for module in modules.values():
+        module.by_itself.gauge = []
+    _carry_out("A", MotionHost(VirtualCan(list(modules.values()), 500_000), {}), motion, machine)
+    low = {name: min(position for _, position in modules[name].by_itself.gauge or ()) for name in "XY"}
+    assert low == pytest.approx({"X": -6.0, "Y": -3.0}, abs=0.1)  # mm
 
 
 def test_what_each_method_takes_of_the_bus(runs: dict[str, MethodRun]) -> None:
@@ -105,6 +119,15 @@ def begin(host: MotionHost) -> None:
 
 def stream(host: MotionHost, steps: int = 2000) -> None:
     host.stream({2: motion_frames.pieces_of_increments([16] * steps)}, steps, T)
+
+
+def test_the_hosts_clock_does_not_follow_one_that_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    with can.Bus(interface="virtual", channel="set-clock") as bus:
+        port = CanPort(bus)
+        before = port.now()
+        assert before == pytest.approx(time.time(), abs=1.0)
+        monkeypatch.setattr(time, "time", lambda: before + 3600.0)
+        assert port.now() - before < 60.0
 
 
 def test_lost_pieces_are_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
+import can
 import pytest
 from typer.testing import CliRunner
 
 from rds.bus.modules.rds import frames
 from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.network.loops.bus_clocks import measure_clocks
+from rds.network.loops.bus_clocks import _answers, measure_clocks
 
 
 @pytest.mark.realtime
@@ -30,6 +33,14 @@ def test_the_codec_of_a_clock() -> None:
     assert frames.decode_clock(identifier, data) == (3, pytest.approx(12.000000345, abs=1e-9))
     assert frames.decode_clock(identifier, data[:7]) is None
     assert frames.decode_clock(frames.IDENTITY, data) is None
+
+
+def test_the_clock_of_a_strangers_module_is_not_taken_for_one_of_the_machines() -> None:
+    told = [frames.encode_clock(node, 1.0) for node in (9, 2)]
+    heard = [None, *(can.Message(arbitration_id=identifier, data=data) for identifier, data in told)]
+    bus = SimpleNamespace(recv=lambda timeout: heard.pop(0) if heard else time.sleep(timeout), send=lambda *_: None)
+    clocks, _, _ = _answers(bus, can.Message(arbitration_id=frames.CALL), [2, 3])  # type: ignore[arg-type]
+    assert clocks == {2: pytest.approx(1.0)}
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 import rds
 from rds.cli.main import app
 from rds.network.loops.bus_times import directions
+from rds.network.loops.host_load import HostLoad
+from rds.network.loops.measure import _measured, _plan
 from rds.network.trace import read_trace
 
 COMMAND, ANSWER = 0x010, 0x021
@@ -37,6 +39,28 @@ def test_without_stamps_each_direction_is_half_of_the_round_trip() -> None:
     assert found.sensor == pytest.approx([0.1, 0.2])
     assert found.actuator == pytest.approx([0.1, 0.2])
     assert found.split_error == pytest.approx(0.2)
+
+
+class Still:
+    """Drivers of axes that stand."""
+
+    def start(self) -> None: ...
+    def exchange(self) -> list[float]:
+        return [0.0] * 3
+
+    def write(self, voltages: list[float]) -> list[float]:
+        return voltages
+
+    def close(self) -> None: ...
+
+
+def test_an_adapter_that_can_be_opened_once_is_the_drivers_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rds.bus.modules.dialects.open_drivers", lambda *_: Still())
+    monkeypatch.setattr("rds.bus.tools.link.open_bus", lambda *_, **__: pytest.fail("it was opened for a second node"))
+    plan = _plan("mini-cnc", 0.002, {"interface": "slcan", "channel": "/dev/ttyACM0"}, "p")
+    found = _measured(plan, 20, HostLoad())
+    assert len(found.sensor) > 0 and found.sensor == pytest.approx(found.actuator)
+    assert found.to_json()["bus_load_percent"] is None and "bus load" not in str(found)
 
 
 @pytest.mark.realtime

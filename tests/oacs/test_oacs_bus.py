@@ -224,10 +224,13 @@ def test_a_host_that_is_killed_leaves_nothing_moving(serve: Serve, bus: can.BusA
     assert Module(bus, 4).stop().counts < 100 * 169 / 4
 
 
-def test_the_cyclic_exchange(serve: Serve, bus: can.BusABC, channel: str) -> None:
+def test_the_cyclic_exchange(serve: Serve, bus: can.BusABC, channel: str, monkeypatch: pytest.MonkeyPatch) -> None:
     serve()
+    opened, plain = [], can.Bus
+    monkeypatch.setattr(can, "Bus", lambda *given, **options: opened.append(given) or plain(*given, **options))
     drivers = OacsDrivers(MACHINE, channel=channel, sample_period=0.005)
     drivers.start()
+    assert len(opened) == 1, "most adapters can be opened once and no more"
     for _ in range(100):
         positions = drivers.exchange()
         drivers.write([8.0, -8.0, 0.0, 5.0])

@@ -234,9 +234,12 @@ def test_homing_finds_the_zero(bench: Benches) -> None:
     assert rig.said("Status")[-1].fields["Homed"] == 1 and not plant.switches[0].open
 
 
-def test_homing_from_on_the_switch(bench: Benches) -> None:
+@pytest.mark.parametrize("homed", [False, True])
+def test_homing_from_on_the_switch(bench: Benches, homed: bool) -> None:
     rig = bench("X", start=-152.5)
     rig.run(0.3)
+    rig.module.mover.homed = homed  # once before, since when counts were lost
+    rig.module.plant.counter.recorded += 500
     rig.module.plant.look(rig.now)
     rig.run(0.3)
     assert rig.module.plant.switches[0].open

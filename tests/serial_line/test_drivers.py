@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,7 @@ from rds.bus.modules.dcs import frames
 from rds.bus.modules.dcs.drivers import DcsDrivers, exchange_time
 from rds.bus.modules.dcs.frames import Info, Mode, Status
 from rds.bus.modules.dcs.port import is_there
-from rds.bus.modules.dcs.server import serve
+from rds.bus.modules.dcs.server import PtyEnd, serve
 from rds.bus.modules.server_process import end_server, start_server
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
@@ -66,6 +68,21 @@ def test_a_dry_run_moves_nothing(served: Server, drivers: Callable[..., DcsDrive
         assert cycle(d, [5.0, 5.0, 5.0], 20) == [0.0, 0.0, 0.0]
     finally:
         d.close()
+
+
+def test_a_converter_beyond_what_a_frame_carries_is_refused_at_the_start() -> None:
+    machine = load_machine("starmill")
+    with pytest.raises(InputError, match="its converter gives 12 V, and a frame on a serial line carries 10 V"):
+        DcsDrivers(replace(machine, converter=replace(machine.converter, range=12.0)))
+
+
+def test_a_host_that_reads_nothing_does_not_hold_the_units_up() -> None:
+    end = PtyEnd("deaf", 38_400)
+    writing = threading.Thread(target=lambda: [end.write(bytes(4096)) for _ in range(100)], daemon=True)
+    writing.start()
+    writing.join(10.0)
+    assert not writing.is_alive()
+    end.close()
 
 
 def test_a_second_host_is_refused(served: Server, drivers: Callable[..., DcsDrivers]) -> None:

@@ -15,6 +15,7 @@ LOG = logging.getLogger(__name__)
 
 RETRY = 0.5  # s between attempts to open a bus that failed
 _SEND_TIMEOUT = 0.1  # s
+_AHEAD = 1.0  # s by which a stamp may be ahead of this computer's clock: clocks drift while nothing comes
 Outgoing = tuple[int, bytes, bool]  # identifier, data, extended
 
 
@@ -120,25 +121,28 @@ class BusNode(ABC):
 class BusTime:
     """Bus time from time stamps: from frame to frame it never goes back, and between goes on by the local clock. In s.
 
-    A stamp's clock may be stepped (some interfaces stamp with the wall clock); then time goes on from where it was.
+    A stamp's clock may be set (some interfaces stamp with the wall clock); then time goes on from where it was.
     To ask for the time now changes nothing: a frame that is still under way may have been stamped before.
     """
 
     def __init__(self) -> None:
         self._last = time.time()
         self._shift = 0.0  # bus time less stamp
-        self._offset = self._last - time.monotonic()  # bus time less local clock
+        self._offset = self._last - time.monotonic()  # bus time less local clock, when the last frame was taken
+        self._quickest = self._offset  # the same of the frame that was taken soonest after its stamp
 
     def at(self, stamp: float) -> float:
         """The bus time of a frame stamped `stamp`, which has just been received; a stamp of 0 means none."""
         if not stamp:
             return self.now()
-        instant = stamp + self._shift
-        if instant < self._last:
-            self._shift += self._last - instant
-            instant = self._last
+        local, instant = time.monotonic(), stamp + self._shift
+        now = local + self._quickest
+        if not self._last <= instant <= now + _AHEAD:
+            instant = self._last if instant < self._last else max(self._last, now)
+            self._shift = instant - stamp
         self._last = instant
-        self._offset = instant - time.monotonic()
+        self._offset = instant - local
+        self._quickest = max(self._quickest, self._offset)
         return instant
 
     def now(self) -> float:

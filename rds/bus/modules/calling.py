@@ -26,7 +26,7 @@ def find_machine(
     try:
         bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), timeout)
         for message in frames_within(bus, timeout):
-            if message.arbitration_id in names:
+            if message.arbitration_id in names and not message.is_error_frame:
                 found.add(names[message.arbitration_id])
                 if len(found) == len(names):
                     break

@@ -10,15 +10,17 @@ from __future__ import annotations
 import contextlib
 import time
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from math import inf
+from itertools import pairwise
+from math import ceil, inf
 from typing import Any, Generic, TypeVar
 
 from rds.bus.tools.link import bus_failed
 from rds.core.contracts import Counters, Limits, Watch, unwatched
 from rds.core.errors import MachineError
 
-_STANDSTILL = 20  # ticks in which no encoder moves until the axes count as standing
+_STANDSTILL = 20  # ticks in which no encoder leaves two neighbouring counts, until the axes count as standing
 _LONGEST_COAST = 3.0  # s until then
 _HALF, _TURN = 1 << 31, 1 << 32  # of a module's counter
 
@@ -48,6 +50,12 @@ class Module:
 
     def __str__(self) -> str:
         return self.title
+
+
+def _goes_on(way: Sequence[int]) -> bool:
+    """Whether counts go one way, and do not only change to and fro, as those of a fine encoder at rest."""
+    net = abs(way[-1] - way[0])
+    return net > 1 and 2 * net > sum(abs(after - before) for before, after in pairwise(way))
 
 
 M = TypeVar("M", bound=Module)
@@ -131,10 +139,12 @@ class DriversBase(ABC, Generic[M, Frame]):
     def start(self, watch: Watch = unwatched) -> None:
         """Refuse other hosts, set the modules up, wait until all axes stand, and take the origins.
 
-        Raises MachineError naming the modules that don't answer, the ones that share an address, and if another host
-        commands the bus. `watch(axis, position)` hears of an axis that is homed.
+        Raises MachineError naming the modules that don't answer, the ones that share an address, the axes that do not
+        come to rest, and if another host commands the bus. `watch(axis, position)` hears of an axis that is homed.
         """
         self._started = False
+        for module in self._modules:
+            module.seen, module.missed = False, 0
         with self._failing():
             self._refuse_company()
             self._set_up(watch)
@@ -150,14 +160,23 @@ class DriversBase(ABC, Generic[M, Frame]):
         return [module.standing for module in self._modules]
 
     def _wait_for_standstill(self) -> None:
-        """An earlier run may have left an axis coasting."""
-        still, before = 0, [module.counts for module in self._modules]
-        deadline = time.monotonic() + _LONGEST_COAST
-        while still < _STANDSTILL and time.monotonic() < deadline:
+        """An earlier run may have left an axis coasting. MachineError for one that goes on moving without a command."""
+        most = ceil(_LONGEST_COAST / self._period)  # ticks, not s: while a computer stands still nobody looks
+        wanted = min(_STANDSTILL, most)
+        looks: deque[list[int]] = deque(maxlen=wanted + 1)
+        for _ in range(most + wanted):
             self._paced_exchange()
-            now = [module.counts for module in self._modules]
-            still = still + 1 if now == before else 0
-            before = now
+            if any(module.missed for module in self._modules):
+                continue  # one that says nothing may move
+            looks.append([module.counts for module in self._modules])
+            if len(looks) > wanted and all(max(way) - min(way) <= 1 for way in zip(*looks, strict=True)):
+                return
+        ways = zip(self._modules, zip(*looks, strict=True), strict=False)
+        if moving := [module for module, way in ways if not module.absolute and _goes_on(way)]:
+            raise MachineError(
+                f"{', '.join(map(str, moving))} on bus {self._bus_name} did not come to rest in {_LONGEST_COAST:g} s "
+                "without a command: see what moves it (its weight, a hand, an amplifier's offset), then start again"
+            )
 
     def _paced_exchange(self) -> None:
         due = time.monotonic() + self._period

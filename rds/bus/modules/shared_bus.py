@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import socket
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from copy import copy
@@ -66,7 +65,7 @@ class SharedInterface:
                 raise can.CanOperationError(f"bus {self._name} is closed")
             self._bus.send(message, timeout)
             heard = copy(message)
-            heard.timestamp = time.time()
+            heard.timestamp = 0.0  # none: the adapter's stamps may be of another clock than this computer's
             self._deliver(heard, sender)
 
     def leave(self, end: SharedEnd) -> None:
@@ -114,37 +113,48 @@ class SharedEnd(can.BusABC):
 
     def __init__(self, shared: SharedInterface, filters: Any, info: str):
         self._shared = shared
+        self._guard = threading.Lock()  # of the frames, the failure, and the byte that tells of them
         self._frames: deque[can.Message] = deque()
         self._failure: Exception | None = None
-        self._awake, self._wakes = socket.socketpair()  # a byte for each frame
-        self._wakes.setblocking(False)
+        self._awake, self._wakes = socket.socketpair()  # a byte, as long as there is a frame or the failure
         self.channel_info = info
         super().__init__(channel=info, can_filters=filters)
 
     def take(self, message: can.Message) -> None:
         """A frame from the bus or from another module. One more than it can hold is lost, as in a controller."""
-        if self._matches_filters(message) and len(self._frames) < _MOST:
-            self._frames.append(message)
-            with contextlib.suppress(OSError):
-                self._wakes.send(b"\0")
+        if not self._matches_filters(message):
+            return
+        with self._guard:
+            if not self._frames:
+                self._wake()
+            if len(self._frames) < _MOST:
+                self._frames.append(message)
 
     def fail(self, error: Exception) -> None:
         """The bus has failed: recv() raises it, after the frames that came before."""
-        self._failure = error
-        with contextlib.suppress(OSError):
+        with self._guard:
+            self._failure = error
+            if not self._frames:
+                self._wake()
+
+    def _wake(self) -> None:
+        with contextlib.suppress(OSError):  # it is closed
             self._wakes.send(b"\0")
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         self._awake.settimeout(timeout)
         try:
-            if not self._awake.recv(1):
-                return None, True
+            self._awake.recv(1, socket.MSG_PEEK)
         except (TimeoutError, BlockingIOError):
             return None, True
-        if self._frames:
-            return self._frames.popleft(), True
-        if self._failure is not None:
-            raise can.CanOperationError(str(self._failure) or type(self._failure).__name__) from self._failure
+        with self._guard:
+            if self._frames:
+                message = self._frames.popleft()
+                if not self._frames and self._failure is None:
+                    self._awake.recv(1)
+                return message, True
+            if self._failure is not None:
+                raise can.CanOperationError(str(self._failure) or type(self._failure).__name__) from self._failure
         return None, True
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:

@@ -66,10 +66,10 @@ def _cyclic(opened: Callable[[], can.BusABC], distributed: dict[int, Row]) -> li
         answers = {frames.answer_identifier(node): node for node in frames.NODES}
         found: dict[int, Row] = {}
         for message in frames_within(bus, _WAIT):
-            if message.is_extended_id or message.arbitration_id not in answers:
+            if message.is_extended_id or message.is_error_frame or len(message.data) != 8:
                 continue
-            node = answers[message.arbitration_id]
-            if node not in distributed:
+            node = answers.get(message.arbitration_id)
+            if node is not None and node not in distributed:
                 status = frames.decode_answer(message.arbitration_id, message.data).status
                 found[node] = {"id": node, "type": "axis", "dialect": "rds", "version": None, "state": _state(status)}
         return [found[node] for node in sorted(found)]

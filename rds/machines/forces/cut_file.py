@@ -98,7 +98,7 @@ class CutFile:
     def force(self, feed: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Cutting forces (n,), N, at feeds (n,) in mm/s and spindle speeds (n,) in rev/min; 0 without feed.
 
-        InputError where something is fed to a spindle that stands.
+        The spindle turns where there is feed: who knows the line of the program refuses anything else.
         """
         moves = feed > 0.0
         made = np.zeros(len(feed))

@@ -53,10 +53,6 @@ class ForceLaw:
         """The force, N; arrays answer as arrays. A feed of 0 cuts nothing."""
         return self.K * np.power(d, self.depth) * (np.power(V, self.speed) if self.speed else 1.0) * f**self.feed
 
-    def feed_for(self, force: Any, d: Any, V: Any) -> Any:
-        """The feed (mm) at which the force is `force` N: equation 4 solved for f."""
-        return np.power(force / self.force(d, V, 1.0), 1.0 / self.feed)
-
 
 def coefficient_names(path: str | Path | None = None) -> list[str]:
     """Names of the force laws of the package, or of a file with the same form."""

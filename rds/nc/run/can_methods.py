@@ -66,8 +66,11 @@ def can_gains(axis: Axis, volts: float = 0.0, period: float = 1.0) -> tuple[floa
 def check_room(machine: Machine, motion: SerialMotion, method: str, bitrate: int, period: float) -> None:
     """InputError for what does not fit: axes beyond a frame's set points, steps too long, a bus too slow."""
     names = [*motion.axes, *([motion.spindle.name] if motion.spindle is not None else [])]
-    if method == "A" and any(list(machine.axes).index(name) >= motion_frames.SLOTS for name in names):
-        raise InputError(f"a frame of method A carries the set points of a machine's first {motion_frames.SLOTS} axes")
+    if method == "A" and (beyond := [name for name in names if machine.slots[name] >= motion_frames.SLOTS]):
+        raise InputError(
+            f"{beyond[0]} has slot {machine.slots[beyond[0]] + 1}, and a frame of method A carries the set points of "
+            f"slots 1 to {motion_frames.SLOTS}; take method B or C"
+        )
     steps = np.abs(np.diff(motion.positions, axis=0)).max(initial=0.0, axis=0) / motion.blu
     most = 1024.0 if method == "A" else motion_frames.MOST_INCREMENT
     if (steps > most).any():
@@ -110,8 +113,10 @@ def run_can_method(
             raise InputError("a simulation has a bus of its own; leave channel and its options out")
         drifting = drift_by_axis(drift, machine)
         modules = [
-            AxisModule(axis, slot, motion.period, 0.0, drifting[axis.name] * 1e-6)
-            for slot, axis in enumerate(machine.axes.values())
+            AxisModule(
+                axis, machine.slots[axis.name], motion.period, 0.0, drifting[axis.name] * 1e-6, machine.converter.range
+            )
+            for axis in machine.axes.values()
         ]
         for module in modules:
             module.by_itself.gauge = []
@@ -215,7 +220,7 @@ def _carried_out(
         host.begin(node, kind, start, can_gains(machine.axis(name), machine.converter.range, period))
     since = host.port.bits
     if method == "A":
-        slots = {node: list(machine.axes).index(name) for name, node in zip(names, nodes, strict=True)}
+        slots = {node: machine.slots[name] for name, node in zip(names, nodes, strict=True)}
         steps = len(fine) - 1
         if dry:
             host.stop_all()

@@ -202,7 +202,7 @@ def _answers(bus: can.BusABC, call: can.Message, nodes: Sequence[int]) -> tuple[
         found = None
         if message is not None and message.is_extended_id and not message.is_error_frame:
             found = frames.decode_clock(message.arbitration_id, message.data)
-        if found is not None:
+        if found is not None and found[0] in nodes:
             if not told:
                 received = time.monotonic()
             told[found[0]] = found[1]

@@ -13,6 +13,7 @@ from __future__ import annotations
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,7 @@ class Measurement:
     actuator: np.ndarray
     lateness: np.ndarray  # s from when a sample was due until its tick was sent
     split_error: float  # s: how far the split between both directions can be wrong
-    bus_load: float  # % of the bit rate
+    bus_load: float  # % of the bit rate; NaN where no second node can listen
     bitrate: int  # bit/s that the load is of
     host: HostLoad
 
@@ -73,7 +74,7 @@ class Measurement:
             "samples": len(self.sensor),
             "delays_us": {name: _summary(values) for name, values in self.parts().items()},
             "split_error_us": _finite(self.split_error * 1e6),
-            "bus_load_percent": self.bus_load,
+            "bus_load_percent": _finite(self.bus_load),
             "bitrate": self.bitrate,
             "host_load_percent": self.host.summary(),
         }
@@ -102,7 +103,8 @@ class Measurement:
             shown = [f"{'-' if cell is None else format(cell, '.1f'):>8}" for cell in cells]
             lines.append(f"{names[name]:<26}{''.join(shown[:4])} {shown[4]} {shown[5]}{summary['lost']:>7}")
         lines.append(f"the split between both directions is good to ± {self.split_error * 1e6:.0f} µs")
-        lines.append(f"bus load {self.bus_load:.1f} % of {self.bitrate / 1e3:g} kbit/s")
+        if isfinite(self.bus_load):
+            lines.append(f"bus load {self.bus_load:.1f} % of {self.bitrate / 1e3:g} kbit/s")
         for phase, load in told["host_load_percent"].items():
             whole = "" if load["computer_mean"] is None else f", the computer {load['computer_mean']:.0f} %"
             mean, most = load["process_mean"], load["process_max"]
@@ -159,6 +161,7 @@ def _plan(machine: str, sample_period: float | None, bus: dict[str, Any], contro
 
 def _measured(plan: Plan, samples: int, host: HostLoad) -> Measurement:
     from rds.bus.modules.dialects import DEFAULT, open_drivers
+    from rds.bus.modules.shared_bus import OPEN_TO_MANY
     from rds.bus.tools.link import bus_name, bus_options, open_bus
     from rds.bus.tools.statistics import BITRATE, Statistics
 
@@ -168,7 +171,7 @@ def _measured(plan: Plan, samples: int, host: HostLoad) -> Measurement:
     interface, channel = bus["interface"], bus.get("channel")
     bitrate = int(bus.get("baud", DEFAULT_BAUD) if interface == SERIAL else bus.get("bitrate", BITRATE))
     watcher = None
-    if interface != SERIAL:  # nobody else can listen there
+    if interface in OPEN_TO_MANY:  # nobody else can listen on a serial line, and most adapters are opened once
         watcher = open_bus(interface, channel, None, node="watcher", **bus_options(bus))
     clock = RealTimeClock(round(plan.T * 1e9), LatePolicy(discard=True))
     drivers = None
@@ -197,14 +200,16 @@ def _measured(plan: Plan, samples: int, host: HostLoad) -> Measurement:
         actuator=found.actuator,
         lateness=late,
         split_error=found.split_error,
-        bus_load=statistics.snapshot().load if watcher is not None else _line_load(plan, bus),
+        bus_load=statistics.snapshot().load if watcher is not None else _line_load(plan, bus, interface),
         bitrate=bitrate,
         host=host,
     )
 
 
-def _line_load(plan: Plan, bus: dict[str, Any]) -> float:
-    """Share of the period that a frame and the answers of all units take on a serial line, %."""
+def _line_load(plan: Plan, bus: dict[str, Any], interface: str) -> float:
+    """Share of the period that a frame and the answers of all units take on a serial line, %; NaN of another bus."""
+    if interface != SERIAL:
+        return nan
     from rds.bus.modules.dcs.drivers import exchange_time
 
     baud, checksum = float(bus.get("baud", DEFAULT_BAUD)), bool(bus.get("checksum", True))

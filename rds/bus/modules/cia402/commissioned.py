@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from json import dumps
 from typing import Any
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")  # what a key of TOML may be without quotes
 
 
 @dataclass
@@ -52,30 +55,31 @@ def machine_text(choices: Choices, about: str) -> str:
     """A machine file. The model and the limits are assumptions, and say so."""
     low, high = choices.travel
     speed = round((high - low) / 4.0, 6)
-    return f"""# Set up by `rds drive setup`: {about}
+    axis = _key(choices.axis)
+    return f"""# Set up by `rds drive setup`: {"".join(letter for letter in about if letter.isprintable())}
 
-name = "{choices.name}"
-title = "{choices.name}, one drive"
+name = {_toml(choices.name)}
+title = {_toml(f"{choices.name}, one drive")}
 sample_period = {choices.period!r}          # s
 
 [converter]
 range = 10.0                   # V; in mode cst they are the rated torque
 bits = 16
 
-[axis.{choices.axis}]
+[axis.{axis}]
 node = {choices.node}
-unit = "{choices.unit}"
+unit = {_toml(choices.unit)}
 travel = [{low!r}, {high!r}]         # {choices.unit}
 resolution = {1.0 / choices.counts!r}     # {choices.unit} per count: {choices.counts:g} counts per {choices.unit}
 
-[axis.{choices.axis}.model]            # assumed, for simulation; fit it to the axis before designing for mode cst
+[axis.{axis}.model]            # assumed, for simulation; fit it to the axis before designing for mode cst
 name = "linear-axis"
 tau = 0.01                     # s
 K = {speed / 10.0!r}
 friction_plus = 0.0
 friction_minus = 0.0
 
-[axis.{choices.axis}.limits]           # assumed: a quarter of the travel in a second
+[axis.{axis}.limits]           # assumed: a quarter of the travel in a second
 velocity = {speed!r}
 acceleration = {speed * 10.0!r}
 jerk = {speed * 500.0!r}
@@ -87,9 +91,9 @@ def experiment_text(choices: Choices, machine: str, bus: Mapping[str, Any]) -> s
     low, high = choices.travel
     amplitude = round(min(abs(low), abs(high)) / 10.0, 6)
     lines = [
-        f'title = "{"A sine" if choices.motion == "sine" else "Steps"} on {choices.axis}"',
-        f'machine = "{machine}"',
-        f'axis = "{choices.axis}"',
+        f"title = {_toml(('A sine' if choices.motion == 'sine' else 'Steps') + f' on {choices.axis}')}",
+        f"machine = {_toml(machine)}",
+        f"axis = {_toml(choices.axis)}",
         'mode = "implementation"',
         "duration = 8.0                 # s",
         "",
@@ -104,13 +108,17 @@ def experiment_text(choices: Choices, machine: str, bus: Mapping[str, Any]) -> s
         "",
     ]
     table = cia402_table(choices)
-    lines += ["[bus.cia402]", f'mode = "{table["mode"]}"', "", f"[bus.cia402.axis.{choices.axis}]"]
+    lines += ["[bus.cia402]", f'mode = "{table["mode"]}"', "", f"[bus.cia402.axis.{_key(choices.axis)}]"]
     axis = dict(table["axis"][choices.axis])
     writes = [f"[0x{index:04X}, {subindex}, {value}]" for index, subindex, value in axis.pop("write", ())]
     lines += [f"{key} = {_toml(value)}" for key, value in axis.items()]
     if writes:
         lines.append(f"write = [{', '.join(writes)}]  # object, sub-index, value; before each run")
     return "\n".join(lines) + "\n"
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _toml(name)
 
 
 def _toml(value: Any) -> str:

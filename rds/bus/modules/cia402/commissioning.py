@@ -93,13 +93,11 @@ def commission(
     What is changed on the drive for the set-up alone is written back at its end, whatever the end is.
     """
     before: dict[tuple[int, int], bytes] = {}
-    made: Commissioned | None = None
     try:
-        made = _commission(bus, options, name, operator, before, eds_folder)
-        return made
-    finally:
-        keep = set() if made is None else {(index, subindex) for index, subindex, _ in made.choices.write}
-        _take_back(bus, options.node, {key: data for key, data in before.items() if key not in keep})
+        return _commission(bus, options, name, operator, before, eds_folder)
+    except BaseException:
+        _set(bus, options.node, before)
+        raise
 
 
 def _commission(
@@ -118,6 +116,10 @@ def _commission(
             _mapping(network, machine, choices, identity, options, operator)
         _limits(_bare(network, options.node), choices, options, operator, before)
     motion = _move(bus, choices, options, units, operator, before)
+    wanted = {(index, subindex): value for index, subindex, value in choices.write}
+    sizes = {key: len(data) for key, data in before.items() if key in wanted}
+    own = {key: (wanted[key] % (1 << 8 * size)).to_bytes(size, "little") for key, size in sizes.items()}
+    _set(bus, options.node, before | own)  # and not what limited the first motion
     choices.direction = operator.choose_direction(motion.moved)
     worst, whole = motion.exchange_worst * 1e3, motion.loop_delay(choices.period) * 1e3
     operator.say(
@@ -278,7 +280,9 @@ def _move(
 ) -> FirstMotion:
     distance = options.distance / choices.counts
     pushes = not choices.fixed_mapping and _has_torque(bus, choices.node)
-    how = f"by a torque that rises to {options.torque} ‰ at most" if pushes else "by its position loop"
+    how = f"by a torque that rises to {options.torque} ‰ at most"
+    if not pushes:
+        how = "by its velocity loop" if choices.mode == "csv" else "by its position loop"
     if not operator.agree(
         f"switch the power on and move {choices.axis} by {options.distance} counts ({distance:.3g} {choices.unit}) and "
         f"back, {how}; the axis must be free, and a hand on the emergency stop"
@@ -365,7 +369,7 @@ def _settings(machine: Machine, choices: Choices) -> DriveSettings:
     return read_settings(cia402_table(choices), machine).drives[0]
 
 
-def _take_back(bus: can.BusABC, node: int, values: Mapping[tuple[int, int], bytes]) -> None:
+def _set(bus: can.BusABC, node: int, values: Mapping[tuple[int, int], bytes]) -> None:
     if not values:
         return
     with library(bus) as network:

@@ -313,6 +313,12 @@ def _download(node: canopen.RemoteNode, index: int, subindex: int, value: int) -
         if variable is None:
             raise MachineError(f"node {node.id}: the EDS has no object 0x{index:04X}:{subindex:02X}")
         size = max(len(variable) // 8, 1)
+        if not -(1 << 8 * size - 1) <= int(value) < 1 << 8 * size:
+            raise InputError(
+                f"0x{index:04X}:{subindex:02X} = {int(value)} does not fit into the {8 * size} bits of this object; "
+                "give a smaller number",
+                f"node {node.id}",
+            )
         node.sdo.download(index, subindex, (int(value) % (1 << 8 * size)).to_bytes(size, "little"))
     except SdoAbortedError as error:
         raise MachineError(f"node {node.id} refuses 0x{index:04X}:{subindex:02X} = {int(value)}: {error}") from error

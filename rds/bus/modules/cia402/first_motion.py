@@ -2,7 +2,7 @@
 
 The torque rises slowly until the axis has moved a few counts, and falls to zero at once; then it is pushed back. So
 direction, sign, friction and delay come from one motion that a hand could stop. A drive without a torque mode is led by
-a few counts of position instead.
+a few counts instead, one in each period: of position, or at the speed that this is.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import can
 import numpy as np
 
 from rds.bus.modules.cia402.host import Cia402Drivers
+from rds.bus.modules.cia402.settings import Command
 from rds.core.errors import MachineError
 from rds.machines.machine import Machine
 
@@ -60,9 +61,9 @@ def first_motion(
     bench = _Bench(drivers, settings.counts, period)
     try:
         drivers.start()
-        if settings.command.leads_position:
-            return bench.led(counts)
-        return bench.pushed(counts, torque, settings.rated_voltage * 1e-3)
+        if settings.command is Command.CST:
+            return bench.pushed(counts, torque, settings.rated_voltage * 1e-3)
+        return bench.led(counts, settings.command is Command.CSV)
     finally:
         drivers.close()
 
@@ -125,14 +126,14 @@ class _Bench:
         self.look(0.0)
         moved = self.at - start
         sign = 1 if moved > 0 else -1
-        delay = self._back(-given * volts, start, sign)
+        delay = self._back(given, torque, volts, start, sign)
         return self._told(moved, given, sign > 0, delay)
 
-    def _back(self, command: float, start: int, sign: int) -> int | None:
+    def _back(self, given: float, torque: int, volts: float, start: int, sign: int) -> int | None:
         """Push it back to where it stood; the samples until the first count."""
         before, delay = self.at, None
         for k in range(round(_RISE / self.period)):
-            now = self.cycle(command * min(1.0 + k * self.period, 1.5))
+            now = self.cycle(-volts * min(given * (1.0 + k * self.period), 1.5 * given, torque))
             if delay is None and (before - now) * sign > 0:
                 delay = k
             if (now - start) * sign <= 0:
@@ -141,14 +142,18 @@ class _Bench:
             self.cycle(0.0)
         return delay
 
-    def led(self, counts: int) -> FirstMotion:
+    def led(self, counts: int, by_speed: bool) -> FirstMotion:
         unit = 1.0 / self.per_unit
+
+        def along(place: int, step: int) -> float:
+            return step * unit / self.period if by_speed else place * unit
+
         self.enable(0.0)
         self.look(0.0)
         start = self.at
         delay = None
         for k in range(counts + round(_REACHES / self.period)):
-            now = self.cycle((start + min(k + 1, counts)) * unit)
+            now = self.cycle(along(start + min(k + 1, counts), k < counts))
             if delay is None and now != start:
                 delay = k
             if abs(now - start) > _BEYOND * counts:
@@ -162,11 +167,11 @@ class _Bench:
         if abs(moved - counts) > 0.5 * counts:
             raise MachineError(
                 f"the axis did not follow: {moved} counts of {counts}; a brake that stays closed (see the drive's "
-                "brake output, 0x60FE), an axis that is blocked, or a position loop that is not tuned"
+                "brake output, 0x60FE), an axis that is blocked, or a loop of the drive that is not tuned"
             )
-        self.look((start + counts) * unit)
+        self.look(along(start + counts, 0))
         for k in range(counts + round(_REST / self.period)):
-            self.cycle((start + max(counts - k - 1, 0)) * unit)
+            self.cycle(along(start + max(counts - k - 1, 0), -(k < counts)))
         return self._told(moved, None, True, delay)
 
     def _told(self, moved: int, torque: float | None, agrees: bool, delay: int | None) -> FirstMotion:

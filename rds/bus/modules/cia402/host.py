@@ -8,6 +8,7 @@ SYNC, take effect at SYNC in all drives at once, and the positions that come bac
 from __future__ import annotations
 
 import logging
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -337,7 +338,10 @@ class Cia402Drivers(CanDrivers[Remote]):
             return
         deadline = time.monotonic() + _STOPPING
         moving = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
-        while any(drive.state in moving for drive in self.drives) and time.monotonic() < deadline:
+        self._lost_after = sys.maxsize  # one that is lost ends nothing any more, and nobody waits for it
+        while any(drive.state in moving and drive.missed < LOST_AFTER for drive in self.drives):
+            if time.monotonic() >= deadline:
+                break
             self._paced_exchange()
         for drive in self.drives:
             if drive.state in moving:

@@ -14,6 +14,7 @@ from rds.bus.modules.drivers_base import Module
 from rds.core.errors import InputError
 
 _HALF, _TURN = 1 << 31, 1 << 32
+_LAST_BIT = 1.0 + 1e-12  # by which the largest voltage, as a target, may be beyond its limit
 
 # The controlword that leads from a state towards OPERATION ENABLED; where power stays off, the way ends before.
 _TOWARDS = {
@@ -115,7 +116,7 @@ class Remote(Module):
         Raises InputError for one that the drive's numbers can't say, or above the torque limit.
         """
         target = value * self._factor
-        if not -self._counts_limit <= target <= self._counts_limit:  # false for NaN too
+        if not abs(target) <= self._counts_limit * _LAST_BIT:  # false for NaN too
             unit, limit = self._unit()
             raise InputError(f"{value!r} {unit} for {self} must be from -{limit:g} to {limit:g} {unit}")
         self.target = round(target)

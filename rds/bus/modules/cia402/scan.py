@@ -14,6 +14,7 @@ from canopen.sdo import SdoAbortedError, SdoCommunicationError
 
 from rds.bus.modules.cia402.codes import State, state_of
 from rds.bus.modules.cia402.configure import library
+from rds.bus.modules.cia402.identity import number, upload
 from rds.bus.modules.cia402.presence import refuse_clashes
 from rds.bus.tools.link import BUILTIN, bus_failed, bus_name, open_bus
 from rds.bus.tools.listening import pause
@@ -87,35 +88,23 @@ def _quiet() -> Iterator[None]:
         log.disabled = before
 
 
-def _ask(network: canopen.Network, number: int) -> Found:
-    node = network.add_node(number, canopen.ObjectDictionary())
+def _ask(network: canopen.Network, node_id: int) -> Found:
+    node = network.add_node(node_id, canopen.ObjectDictionary())
     node.sdo.RESPONSE_TIMEOUT = _ANSWERS_IN
     try:
         kind = int.from_bytes(node.sdo.upload(0x1000, 0), "little")
     except SdoCommunicationError:  # every device has this object: nobody answers
-        return Found(number, None, None, None, None, None, None, answers=False)
+        return Found(node_id, None, None, None, None, None, None, answers=False)
     except SdoAbortedError:
         kind = None
-    status, name = _number(node, 0x6041), _read(node, 0x1008)
+    status, name = number(node, 0x6041), upload(node, 0x1008)
     profile = None if kind is None else kind & 0xFFFF
     return Found(
-        node=number,
+        node=node_id,
         profile=profile,
         name=None if name is None else name.rstrip(b"\0").decode("ascii", "replace"),
-        vendor=_number(node, 0x1018, 1),
-        product=_number(node, 0x1018, 2),
-        revision=_number(node, 0x1018, 3),
+        vendor=number(node, 0x1018, 1),
+        product=number(node, 0x1018, 2),
+        revision=number(node, 0x1018, 3),
         state=state_of(status) if status is not None and profile == _DRIVE else None,
     )
-
-
-def _read(node: canopen.RemoteNode, index: int, subindex: int = 0) -> bytes | None:
-    try:
-        return bytes(node.sdo.upload(index, subindex))
-    except (SdoAbortedError, SdoCommunicationError):
-        return None
-
-
-def _number(node: canopen.RemoteNode, index: int, subindex: int = 0) -> int | None:
-    data = _read(node, index, subindex)
-    return None if data is None else int.from_bytes(data, "little")

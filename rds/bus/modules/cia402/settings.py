@@ -19,6 +19,7 @@ from rds.machines.machine import Axis, Machine
 
 OUR_EDS = "axis.eds"
 _NODES = range(1, 128)
+_HEARTBEAT = Quantity("time between two heartbeats", "s", 0.001, 20.0)  # one, and three, in 16 bits of ms
 _HALF = 1 << 31  # counts: a drive's positions are of 32 bits
 
 
@@ -146,7 +147,7 @@ def read_settings(table: Mapping[str, Any], machine: Machine, axes: Sequence[str
     return Settings(
         drives=drives,
         host=host,
-        heartbeat=_more_than_0(table, "heartbeat", 0.1, "s", where),
+        heartbeat=float(_HEARTBEAT.check(table.get("heartbeat", 0.1), "heartbeat", where)),
         transmission=transmission,
         absolute=positions == "drive",
         homing_timeout=_more_than_0(table, "homing_timeout", 60.0, "s", where),

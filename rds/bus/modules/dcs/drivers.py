@@ -84,6 +84,12 @@ class DcsDrivers(drivers_base.DriversBase[_Unit, Answer]):
         names = list(machine.axes)
         if len(names) > frames.SLOTS:
             raise InputError(f"{len(names)} axes; a frame has places for {frames.SLOTS}; serve it on CAN", machine.path)
+        if machine.converter.range > frames.HIGHEST_VOLTAGE:
+            raise InputError(
+                f"its converter gives {machine.converter.range:g} V, and a frame on a serial line carries "
+                f"{frames.HIGHEST_VOLTAGE:g} V: serve it on CAN, or say range = 10.0 in [converter]",
+                machine.path,
+            )
         used = [machine.axis(name) for name in (names if axes is None else axes)]
         self._slots = [names.index(axis.name) for axis in used]
         for axis in used:

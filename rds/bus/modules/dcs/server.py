@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -70,6 +70,7 @@ class PtyEnd:
             ) from None
         self._master, self._slave = os.openpty()  # the slave stays open, or a host that leaves would end the line
         tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
         self._link.unlink(missing_ok=True)
         self._link.symlink_to(os.ttyname(self._slave))
 
@@ -85,8 +86,9 @@ class PtyEnd:
         return speed is None or self._termios.tcgetattr(self._master)[4] == speed
 
     def write(self, data: bytes) -> None:
-        """As End."""
-        os.write(self._master, data)
+        """As End; what a host does not read is lost, as on wires."""
+        with suppress(BlockingIOError):
+            os.write(self._master, data)
 
     def close(self) -> None:
         """Take the line away."""

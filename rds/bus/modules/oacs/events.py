@@ -108,7 +108,7 @@ class Reconfigurations:
         self._described &= keys
         if len(here) < self.expected or len({module.id for module in here}) < len(here):
             return False
-        for number, serial in sorted(keys - self._described, key=str):
+        for number, serial in sorted(keys - self._described):
             try:
                 told = Module(self._bus, number).download(_PATIENCE)
             except MachineError:

@@ -104,7 +104,9 @@ class Mover:
             self._close(Acknowledges.HOME, Result.CARRIED_OUT)
             return Result.ACCEPTED
         low = self.plant.switches[0].open
-        return self._begin(Motion(Mode.HOMING, Acknowledges.HOME, at, 1 if low else -1, duty=HOMING_DUTY))
+        result = self._begin(Motion(Mode.HOMING, Acknowledges.HOME, at, 1 if low else -1, duty=HOMING_DUTY))
+        self.homed = self.homed and result != Result.ACCEPTED  # till it is found anew
+        return result
 
     def switch_direction(self, at: float) -> Result:
         """What is left of the way, the other way; a jog or a tool turns round."""

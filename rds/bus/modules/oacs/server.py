@@ -1,7 +1,7 @@
 """The distributed modules behind the bus: those of a machine in one process, or each in its own.
 
 `python -m rds.bus.modules.oacs.server MACHINE [--modules X,Z]` writes one line, "ready ...", on stdout when all
-modules are on the bus, and reports on stderr. Lines on stdin press buttons and cut wires (bench.py). Its options and
+modules are on the bus, and reports on stderr. Lines on stdin press buttons and cut wires (`handle`). Its options and
 its end are those of rds/bus/modules/server_program.py.
 """
 
@@ -48,7 +48,7 @@ def serve(
 ) -> None:
     """Serve the modules of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`.
 
-    `lines` are what hands do at the machine (bench.py); `serials` are the modules' serial numbers, by name, random
+    `lines` are what hands do at the machine (`handle`); `serials` are the modules' serial numbers, by name, random
     where not given. InputError also for a module's data that cannot be.
     """
     data = read_modules(machine)

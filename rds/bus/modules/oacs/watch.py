@@ -61,7 +61,7 @@ class Watch:
     @property
     def modules(self) -> list[ModuleInfo]:
         """Those that are there."""
-        return [self._known[key] for key in sorted(self._known, key=str)]
+        return [self._known[key] for key in sorted(self._known)]
 
     def look(self) -> list[Event]:
         """Call once and return what changed; some 0.05 s, more when somebody is new. MachineError: the bus failed."""

@@ -34,7 +34,7 @@ LOG = logging.getLogger(__name__)
 SILENT_AFTER = 10  # periods in a row without an answer; then all axes get zero volts until it answers again
 LOST_AFTER = 0.1  # s without an answer, and SILENT_AFTER periods at least: the run ends. Computers stall for less
 _STARTING = 1.0  # s for all modules to answer at the start
-_SET_UP_AGAIN = 20  # ticks at the start until a module that was not set up is so again
+_SET_UP_AGAIN = 20  # ticks at the start, a quarter of it at most, until a module that was not set up is so again
 _RELEASE = "release its button, then `rds estop --reset`, or Release at the top of the page"
 _ALARMS = int(Status.EMERGENCY | Status.NOT_SET_UP | Status.REFUSED)  # a plain number: flags cost 1 µs
 
@@ -52,10 +52,11 @@ class Counters(contracts.Counters):
 class _Module(drivers_base.Module):
     """A module of the cyclic frames, and the order of its answers."""
 
-    __slots__ = ("doubtful", "order")
+    __slots__ = ("axis", "doubtful", "order")
 
     def __init__(self, axis: Axis):
         super().__init__(f"{axis.name} (node {axis.node})", axis.resolution, absolute=axis.unit == "rev/min")
+        self.axis = axis
         self.order = AnswerOrder()
         self.doubtful: Answer | None = None  # since the last tick: to a tick before, or to this one after a lost one
 
@@ -153,13 +154,14 @@ class AxisDrivers(CanDrivers[_Module]):
         self._waiting_voltages = (0.0,) * len(self._modules)
         self._send(frames.SETUP, self._setup)
         deadline = time.monotonic() + _STARTING
+        again = min(_SET_UP_AGAIN, ceil(0.25 * _STARTING / self._period))
         while silent := [module for module in self._modules if not module.seen]:
             if time.monotonic() > deadline:
                 raise self._silent(silent)
             for module in self._modules:
                 module.missed = 0
             try:
-                if self.counters.ticks % _SET_UP_AGAIN == _SET_UP_AGAIN - 1:  # a frame may be lost
+                if self.counters.ticks % again == again - 1:  # a frame may be lost
                     self._send(frames.SETUP, self._setup)
                 self.exchange()
             except MachineError as error:
@@ -188,8 +190,8 @@ class AxisDrivers(CanDrivers[_Module]):
     def _take_answer(self, module: _Module, message: can.Message, late: bool) -> _Module | None:
         """As DriversBase._take. MachineError if the module has stopped, or is another than at the start."""
         answer = frames.decode_answer(message.arbitration_id, message.data)
-        if answer.status & _ALARMS:
-            self._take_alarm(module, answer)
+        if answer.status & _ALARMS and not self._take_alarm(module, answer):
+            return None
         if answer.kind != Kind.ANSWER:
             self.counters.watchdogs += bool(answer.status & Status.WATCHDOG)
             return None
@@ -213,13 +215,16 @@ class AxisDrivers(CanDrivers[_Module]):
         """What the load cell says; MachineError for what is no force."""
         self.force = frames.decode_force(message.data)
 
-    def _take_alarm(self, module: _Module, answer: Answer) -> None:
-        """What a module says besides its position."""
+    def _take_alarm(self, module: _Module, answer: Answer) -> bool:
+        """What a module says besides its position; whether that counts, for it is set up."""
         if answer.status & Status.EMERGENCY:
             raise MachineError(f"emergency stop of {module}; {_RELEASE}")
-        if answer.status & Status.NOT_SET_UP and self._started:
-            raise self._replaced(module)
+        if answer.status & Status.NOT_SET_UP:
+            if self._started:
+                raise self._replaced(module)
+            return False
         self.counters.refused += bool(answer.status & Status.REFUSED)
+        return True
 
     def _place(self, module: _Module, answer: Answer) -> Place:
         """Where the answer stands among those of its module. MachineError if they are another module's."""

@@ -63,7 +63,7 @@ class AxisModule:
         turns = axis.unit == SPINDLE_UNIT
         self.motion = MachineAxis(machine_parameters(axis), start, turns)
         self.drift = float(axis.module.get("drift", 0.0)) * 1e-6 if drift is None else drift
-        self.by_itself = NodeMotion(axis.name, self.motion, axis.resolution, frames.HIGHEST_VOLTAGE, self.drift, turns)
+        self.by_itself = NodeMotion(axis.name, self.motion, axis.resolution, range, self.drift, turns)
         self.cell: Callable[[], float] | None = None  # what its load cell measures now, N
         self.status = Status.NONE
         self.ticks = 0
@@ -119,7 +119,7 @@ class AxisModule:
                 return [*self.expire(at), self.latch_emergency(at)]
             elif identifier == motion_frames.SETPOINTS and not self._frame:
                 return self._set_point(data, at)
-            elif identifier == motion_frames.DATA and data[0] == self.node:
+            elif identifier == motion_frames.DATA and len(data) > 2 and data[0] == self.node:
                 self.by_itself.data(data[1], data[2:], at)
         except MachineError as error:
             LOG.warning("module %s ignored a frame: %s", self.name, error)

@@ -60,14 +60,15 @@ class CanPort:
 
     def __init__(self, bus: can.BusABC):
         self._bus, self.bits, self.sent_bytes = bus, 0, 0
+        self._offset = time.time() - time.monotonic()
 
     def now(self) -> float:
-        """The system's clock, by which the built-in bus stamps its frames."""
-        return time.time()
+        """The system's clock, by which the built-in bus stamps its frames, as if nobody had set it since the start."""
+        return time.monotonic() + self._offset
 
     def sleep(self, until: float) -> None:
         """As MotionPort."""
-        time.sleep(max(0.0, until - time.time()))
+        time.sleep(max(0.0, until - self.now()))
 
     def send(self, identifier: int, data: bytes) -> None:
         """As MotionPort."""
