@@ -229,6 +229,11 @@ class Experiment:
     def _prepared(self, mode: str | None, out: str | Path | None, changes: Iterable[Any]) -> Run:
         plan, known = self._resolve(mode)
         plan = plan.with_changes(changes)
+        if plan.program is None and plan.changes and (late := plan.changes[-1])[0] >= plan.samples:
+            raise InputError(
+                f"the change of {late[1]} at {late[0] * plan.T:g} s comes after the run, which lasts "
+                f"{plan.samples * plan.T:g} s; make it earlier, or the run longer"
+            )
         if out is not None:
             require_writable(out)
             folder: Path | None = Path(out)
