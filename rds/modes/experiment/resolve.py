@@ -283,7 +283,7 @@ def _compensated(table: TomlTable, setting: Setting, controller: Controller | No
         raise InputError(
             "[error_compensation] moves the reference, about which the law relay swings; leave it out", table.place()
         )
-    return compensated(controller, setting.T, time, most, axis.unit)
+    return compensated(controller, setting.T, time, most, axis, setting.command)
 
 
 def _following_error(words: TomlTable, setting: Setting, driven: str) -> Allowed | None:
