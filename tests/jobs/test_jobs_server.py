@@ -151,6 +151,16 @@ def test_a_server_that_is_too_busy_to_answer_keeps_its_socket(tmp_path: Path) ->
     address.listen().close()  # that one has gone, and left it behind
 
 
+def test_texts_in_an_experiment_may_be_longer_than_names_of_files(tmp_path: Path) -> None:
+    law = "params = {'note': ''}\ndef control(t, r, y, state, params):\n    return 0.0, state\n"
+    (tmp_path / "law.py").write_text(law)
+    text = EXPERIMENT.format(controller='file = "law.py"\n[controller.params]\nnote = "' + 60 * "a word " + '"')
+    (tmp_path / "long.toml").write_text(text)
+    Folder(tmp_path).check_words(tmp_path / "long.toml")
+    with pytest.raises(InputError, match="is no file in"):
+        Folder(tmp_path).file("ä" * 200)
+
+
 def test_a_port_needs_the_secret_and_a_socket_may_do_without(serve: Serve, alone: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
