@@ -23,7 +23,7 @@ from rds.controllers.lqg_design import Design, designed
 from rds.core.errors import InputError
 from rds.core.options import read_options
 from rds.core.quantities import Quantity
-from rds.core.types import Controller, Reference, Source
+from rds.core.types import NOT_LIVE, Controller, Reference, Source
 
 NAME = "lqg"
 SPINDLE = False
@@ -93,4 +93,4 @@ def make(
     start = (0.0, 0.0, 0.0, 0.0, 0.0, *design.covariance, *[0.0] * (REMEMBERED + design.whole + 2))
     params = {**given, "gains": list(design.gain), "design": design}
     signals = {"velocity": f"{unit}/s", "disturbance": "V"}
-    return Controller(control, start, params, Source(NAME), signals=signals, observe=observe)
+    return Controller(control, start, params, Source(NAME), retune=NOT_LIVE, signals=signals, observe=observe)

@@ -19,7 +19,7 @@ from rds.controllers.axis_data import axis_data
 from rds.controllers.observer import held_axis
 from rds.core.errors import InputError
 from rds.core.quantities import AnyValue, Choice, Declaration, Quantity
-from rds.core.types import Controller, Reference, Source
+from rds.core.types import NOT_LIVE, Controller, Reference, Source
 
 NAME = "smith"
 SPINDLE = False
@@ -91,7 +91,7 @@ def make(
         "prediction": (whole, *parts),
     }
     start = (inner.initial_state, 0.0, 0.0, 0.0, (0.0,) * (whole + 1))
-    return Controller(control, start, params, Source(NAME))
+    return Controller(control, start, params, Source(NAME), retune=NOT_LIVE)
 
 
 def _later(r: Reference, time: float) -> Reference:
