@@ -62,7 +62,7 @@ def make_model(words: TomlTable, setting: Setting) -> Model:
         substeps = table.read("substeps")
         params = _params(table)
         table.done()
-        with named(table):
+        with named(table), limited():  # it may be called once
             return student_model(student, params, substeps)
     if "file" in table:
         return _fitted_model(table, setting)
