@@ -23,7 +23,7 @@ from waiting import wait_for
 
 import rds
 from rds.bus.hub.address import runtime_directory
-from rds.bus.hub.command import Command, remove_left
+from rds.bus.hub.command import Command, commanded, remove_left
 from rds.bus.modules.calling import find_machine
 from rds.bus.modules.dialects import server_module
 from rds.bus.modules.rds.frames import CALL, Kind, Status, answer_identifier, decode_answer
@@ -208,6 +208,15 @@ def test_the_command_of_a_killed_run_is_cleared_away(alone: Path, monkeypatch: p
     with Command("living"):
         remove_left()
         assert [path.name for path in folder.glob("*.command")] == ["living.command"]
+
+
+def test_who_only_looks_keeps_nobody_from_the_command(alone: Path) -> None:
+    looks = Command("own")
+    assert looks.acquire() and commanded("own")
+    given_back = threading.Timer(0.02, looks.release)
+    given_back.start()
+    with Command("own"):
+        given_back.join()
 
 
 def test_a_machine_that_is_killed_before_it_is_there(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
