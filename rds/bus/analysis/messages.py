@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from rds.bus.medium import station
 from rds.bus.medium.bits import Bits, frame_bits, header, least_bits, most_bits
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.frames import Answer, Kind, Status
@@ -81,15 +82,8 @@ class Message:
 
 
 def priority(message: Message) -> int:
-    """What the message shows during arbitration, as a number: the lower wins.
-
-    The 11 leading bits first, then RTR or SRR and IDE: a data frame goes before a remote frame of its identifier, and
-    both before an extended frame that begins with the same 11 bits, whose SRR and IDE are recessive.
-    """
-    identifier, remote = message.identifier, int(message.remote)
-    if not message.extended:
-        return identifier << 21 | remote << 20
-    return identifier >> 18 << 21 | 3 << 19 | (identifier & 0x3FFFF) << 1 | remote
+    """What the message shows during arbitration, as a number: the lower wins."""
+    return station.priority(message.identifier, message.extended, message.remote)
 
 
 def in_order(messages: Iterable[Message]) -> list[Message]:
