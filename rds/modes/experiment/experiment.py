@@ -303,9 +303,10 @@ class Experiment:
             from rds.modes.experiment.compiled import obstacle, run_compiled
 
             note = obstacle(plan) or (None if live is None else "somebody may change it while it runs")
-            if note is None:
-                return run_compiled(plan)
-            note = f"not compiled: {note}"
+            if note is not None:
+                note = f"not compiled: {note}"
+            elif (compiled := run_compiled(plan)) is not None:
+                return compiled
         rows = run_plan(plan, folder, progress, live)
         return replace(rows, notes=(note,)) if note else rows
 
