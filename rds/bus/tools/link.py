@@ -38,7 +38,7 @@ def default_channel(machine: Machine, interface: str, channel: str | None) -> st
     """The channel that was asked for, else the machine's name on the built-in bus and a serial line, else none: the
     interface has a default of its own.
     """
-    return channel if channel is not None or interface not in (BUILTIN, SERIAL) else machine.name
+    return channel if channel is not None or interface not in (BUILTIN, SERIAL) else machine.channel
 
 
 def open_bus(
