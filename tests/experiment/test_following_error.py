@@ -106,6 +106,9 @@ def test_a_spindle_is_not_watched() -> None:
     words: dict[str, Any] = {"axis": "spindle", "reference": {"kind": "constant", "value": 500.0}}
     result = rds.Experiment(controller="pid", duration=0.2, following_error={"ferror": 1.0}, **words).run()
     assert result.meta["ending"] == "done"
+    for key, table in (("following_error", {"ferror": 1.0}), ("error_compensation", {})):
+        with pytest.raises(rds.InputError, match=rf"\[axis.spindle.{key}\] is for position axes.*: remove it"):
+            rds.Experiment(controller="pid", duration=0.2, overrides={"spindle": {key: table}}, **words)
 
 
 @pytest.mark.parametrize(
