@@ -60,6 +60,8 @@ def make_model(words: TomlTable, setting: Setting) -> Model:
     table, student = _table_or_student(words, "model", setting)
     if student is not None:
         substeps = table.read("substeps")
+        if "substeps" in table and "advance" in student.functions:
+            raise table.fault("substeps", "is for derivatives(), and advance() takes a sample in one step; remove it")
         params = _params(table)
         table.done()
         with named(table), limited():  # it may be called once

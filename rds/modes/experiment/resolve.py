@@ -376,9 +376,11 @@ def _timing(words: TomlTable, mode: Mode) -> dict[str, Any]:
         **{key: table.read(key) for key in ("late_limit", "priority", "cpu")},
     }
     table.done()
-    usable = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-    if usable and settings["cpu"] is not None and settings["cpu"] not in usable:
-        raise table.fault("cpu", f"is not a processor that this program may use; it may use {usable}")
+    if settings["cpu"] is not None:
+        if not hasattr(os, "sched_getaffinity"):
+            raise table.fault("cpu", "cannot be chosen on this system; remove it")
+        if settings["cpu"] not in (usable := sorted(os.sched_getaffinity(0))):
+            raise table.fault("cpu", f"is not a processor that this program may use; it may use {usable}")
     return settings
 
 
