@@ -183,7 +183,7 @@ class UntimedMedium(Medium[Node]):
         deaf = self._deaf()
         if strike is not None and strike.kind == "lose":
             missed = [other for other, its in self.stations.items() if strike.receiver in (None, its.name)]
-            deaf = (*deaf, *missed)
+            deaf = tuple({*deaf, *missed})
         for other in deaf:
             self.stations[other].lost += other is not node
         self._waiting.append(Delivery(node, frame, 0, deaf))
