@@ -61,7 +61,7 @@ class Errors:
 
     def within(self, time: int) -> int:
         """How many errors `time` ns can see."""
-        return self.burst + (
+        return int(self.burst) + (
             _ceil(time, _ns(self.interval, down=True)) - 1 if isfinite(self.interval) and time > 0 else 0
         )
 
