@@ -219,3 +219,12 @@ def test_what_a_machine_did_is_kept_where_the_run_cannot_be_simulated() -> None:
     assert "X_simulated" not in result
     (note,) = (note for note in result.meta["notes"] if "has no response to compare with" in note)
     assert "AssertionError: beyond the work" in note
+
+
+def test_another_model_takes_the_place_of_the_axis_s_own() -> None:
+    own = {"controller": "p", "model": {"name": "linear-axis", "tau": 0.02, "K": 1.0}}
+    experiment = rds.Experiment(axis="X", duration=0.5, reference=rds.sinusoid(2.0, 2.0), overrides={"X": own})
+    other = experiment.with_model({"name": "linear-axis", "tau": 0.01, "K": 3.0})
+    assert [each.plan().axes[0].model.params["K"] for each in (experiment, other)] == [1.0, 3.0]
+    with pytest.raises(rds.InputError, match="it has several axes"):
+        rds.Experiment(**GOOD, axis=("X", "Y")).with_model("linear-axis")

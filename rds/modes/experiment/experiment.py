@@ -160,11 +160,13 @@ class Experiment:
 
         InputError for an experiment of several axes, each of which has a model of its own.
         """
-        table = {key: value for key, value in self._words.table.items() if key != "model"}
-        if len(self.plan().axes) > 1 or isinstance(table.get("axis"), dict):
+        if len(self.plan().axes) > 1:
             raise InputError("it has several axes, each with a model of its own; name these in the experiment's file")
+        table = self._words.table | {"model": model}
+        if isinstance(own := table.get("axis"), dict):
+            table["axis"] = {name: {key: each[key] for key in each if key != "model"} for name, each in own.items()}
         changed = copy.copy(self)
-        changed._words = self._words.over_written(table | {"model": model})
+        changed._words = self._words.over_written(table)
         changed.plan()
         return changed
 
