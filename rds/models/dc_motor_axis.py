@@ -19,8 +19,7 @@ from collections.abc import Mapping, Sequence
 from math import expm1, pi
 from typing import Any
 
-from rds.core.errors import InputError
-from rds.core.options import read_options
+from rds.core.options import read_all
 from rds.core.quantities import Quantity
 from rds.core.types import Model, Source
 
@@ -132,10 +131,7 @@ def make(**params: Any) -> Model:
     The model's `tau` (s) and `K` ((mm/s)/V), which controllers are designed for, follow: those of the slow part,
     (J R + b L)/(b R + k²) and k h/(2π)/(b R + k²). Raises InputError for an unknown, missing or impossible parameter.
     """
-    values = _NEUTRAL | read_options(params, PARAMETERS, NAME)
-    for name, option in PARAMETERS.items():
-        if name not in values:
-            raise InputError(f"{NAME} needs {name} ({option.described})")
+    values = read_all(params, PARAMETERS, NAME, _NEUTRAL)
     R, L, k, J, b = (values[name] for name in ("resistance", "inductance", "torque_constant", "inertia", "damping"))
     stiffness = b * R + k * k
     derived = {"tau": (J * R + b * L) / stiffness, "K": k * values["lead"] / (2.0 * pi * stiffness)}
