@@ -81,9 +81,9 @@ def test_a_law_that_hides_a_package_is_named(tmp_path: Path) -> None:
     """Beside a notebook, or a script, Python finds it first."""
     (tmp_path / "control.py").write_text("def control(t, r, y, state, params):\n    return 0.0, state\n")
     (tmp_path / "design.py").write_text(
-        "import rds\nfrom rds.core.extras import needed_for\n"
-        "try:\n    with needed_for('this design'):\n        import control\n"
-        "except rds.InputError as error:\n    print(error)\n"
+        "import rds\nfrom rds.core.extras import needed_for, python_control\n"
+        "try:\n    python_control('this design')\nexcept rds.InputError as error:\n    print(error)\n"
+        "with needed_for('a DataFrame'):  # which does not need it\n    import json\n"
     )
     done = subprocess.run([sys.executable, "design.py"], cwd=tmp_path, capture_output=True, text=True)
     assert done.stdout == (

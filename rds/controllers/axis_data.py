@@ -28,6 +28,9 @@ _MODEL = {
 }
 
 
+LONGEST_DELAY = 200  # samples
+
+
 def axis_data(axis_model: Mapping[str, Any], T: float, converter_range: float, unit: str, owner: str) -> AxisData:
     """The checked data of an axis; InputError if something is missing or impossible."""
     for name, option in _MODEL.items():
@@ -45,3 +48,12 @@ def axis_data(axis_model: Mapping[str, Any], T: float, converter_range: float, u
         ),
         spindle=unit == SPINDLE_UNIT,
     )
+
+
+def check_delayed(axis: AxisData, delay: float, owner: str) -> None:
+    """InputError for a spindle, and for a delay (s) of more samples than a law remembers voltages of."""
+    if axis.spindle:
+        raise InputError(f"{owner} drives position axes; use the controller 'pid' for a spindle")
+    if delay > LONGEST_DELAY * axis.T:
+        what = f"{owner}: delay = {delay:g} s is more than {LONGEST_DELAY} samples of {axis.T:g} s"
+        raise InputError(f"{what}; choose a shorter delay or a longer sample period")

@@ -15,7 +15,7 @@ import numpy as np
 
 from rds.controllers import observer
 from rds.core.errors import InputError
-from rds.core.extras import needed_for
+from rds.core.extras import python_control
 from rds.core.quantities import Quantity
 
 _OFF = 0.01  # of the fastest pole: how far placed poles may lie from those asked for; the rounding of near-deadbeat
@@ -61,9 +61,7 @@ def _place(A: np.ndarray, B: np.ndarray, poles: Sequence[complex]) -> np.ndarray
     # of the tracking controller would otherwise wait seconds for python-control to be imported.
     if B.shape[1] == 1 and (len(poles) <= 2 or len(set(poles)) < len(poles)):
         return _ackermann(A, B, poles)
-    with needed_for("this design"):
-        import control
-
+    control = python_control("this design")
     try:
         gains = np.asarray(control.place(A, B, poles), dtype=float).reshape(B.shape[1], A.shape[0])
     except (ValueError, np.linalg.LinAlgError, control.ControlDimension) as error:
@@ -129,9 +127,7 @@ def tracking_controller_system(tau: float, K: float, poles: Any, observer_pole: 
     saturation; state `z` (mm/s). Continuous without `T`, else the realization for a loop sampled every `T` s, with
     dt = T.
     """
-    with needed_for("this design"):
-        import control
-
+    control = python_control("this design")
     g1, g2 = tracking_gains(tau, poles)
     if T is None:
         L, F, G, H = observer_parameters(tau, K, observer_pole)
@@ -163,9 +159,7 @@ def reduced_order_observer(sys: Any, poles: Any) -> Any:
     With R completing C to a basis, w = R x is what is not measured: ŵ = z + L y, where
     ż = (A₂₂ - L A₁₂) ŵ + (A₂₁ - L A₁₁) y + (B₂ - L B₁) u.
     """
-    with needed_for("this design"):
-        import control
-
+    control = python_control("this design")
     A, B, C, D = (np.asarray(part, dtype=float) for part in (sys.A, sys.B, sys.C, sys.D))
     n, p = A.shape[0], C.shape[0]
     if np.linalg.matrix_rank(C) < p:

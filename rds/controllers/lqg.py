@@ -18,12 +18,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rds.controllers.axis_data import axis_data
+from rds.controllers.axis_data import axis_data, check_delayed
 from rds.controllers.lqg_design import Design, designed
-from rds.core.errors import InputError
 from rds.core.options import read_options
 from rds.core.quantities import Quantity
-from rds.core.types import Controller, Reference, Source
+from rds.core.types import NOT_LIVE, Controller, Reference, Source
 
 NAME = "lqg"
 SPINDLE = False
@@ -37,7 +36,6 @@ OPTIONS = {
 }
 DEFAULTS = {"delay": 0.0, "error": 0.01, "voltage": 1.0, "disturbance": 0.01, "drift": 1.0, "noise": 0.002}
 REMEMBERED = 50  # samples without a measurement after which older voltages are forgotten
-_LONGEST = 200  # samples of delay
 State = tuple[float, ...]
 
 
@@ -84,13 +82,9 @@ def make(
     owner = f"controller {NAME!r}"
     given = DEFAULTS | read_options(options, OPTIONS, owner)
     axis = axis_data(axis_model, T, converter_range, unit, owner)
-    if axis.spindle:
-        raise InputError(f"{owner} drives position axes; use the controller 'pid' for a spindle")
-    if given["delay"] > _LONGEST * T:
-        what = f"{owner}: delay = {given['delay']:g} s is more than {_LONGEST} samples of {T:g} s"
-        raise InputError(f"{what}; choose a shorter delay or a longer sample period")
+    check_delayed(axis, given["delay"], owner)
     design = designed(axis.tau, axis.K, T, converter_range, given)
     start = (0.0, 0.0, 0.0, 0.0, 0.0, *design.covariance, *[0.0] * (REMEMBERED + design.whole + 2))
     params = {**given, "gains": list(design.gain), "design": design}
     signals = {"velocity": f"{unit}/s", "disturbance": "V"}
-    return Controller(control, start, params, Source(NAME), signals=signals, observe=observe)
+    return Controller(control, start, params, Source(NAME), retune=NOT_LIVE, signals=signals, observe=observe)

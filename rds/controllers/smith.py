@@ -15,11 +15,12 @@ from math import floor
 from typing import Any
 
 from rds.controllers import feedforward, modified_pid, pid, proportional, tracking
-from rds.controllers.axis_data import axis_data
+from rds.controllers.axis_data import axis_data, check_delayed
 from rds.controllers.observer import held_axis
 from rds.core.errors import InputError
-from rds.core.quantities import AnyValue, Choice, Declaration, Quantity
-from rds.core.types import Controller, Reference, Source
+from rds.core.options import check_known
+from rds.core.quantities import AnyValue, Choice, Declaration, Quantity, checked
+from rds.core.types import NOT_LIVE, Controller, Reference, Source
 
 NAME = "smith"
 SPINDLE = False
@@ -35,7 +36,6 @@ OPTIONS: Mapping[str, Declaration] = {
     "law": Choice("the law that is designed without delay", tuple(_INNER), "tracking"),
     "options": AnyValue("its options, as in a table of its own"),
 }
-_LONGEST = 200  # samples of delay
 _ROUNDING = 1e-9  # of a sample
 
 
@@ -61,9 +61,6 @@ def make(
 
     InputError for a spindle, a delay of more than 200 samples, and what the inner law refuses.
     """
-    from rds.core.options import check_known
-    from rds.core.quantities import checked
-
     owner = f"controller {NAME!r}"
     check_known(options, OPTIONS, owner)
     values = {
@@ -71,12 +68,8 @@ def make(
         for name, declared in OPTIONS.items()
     }
     axis = axis_data(axis_model, T, converter_range, unit, owner)
-    if axis.spindle:
-        raise InputError(f"{owner} drives position axes; use the controller 'pid' for a spindle")
     delay, of_inner = values["delay"], values["options"] or {}
-    if delay > _LONGEST * T:
-        what = f"{owner}: delay = {delay:g} s is more than {_LONGEST} samples of {T:g} s"
-        raise InputError(f"{what}; choose a shorter delay or a longer sample period")
+    check_delayed(axis, delay, owner)
     if not isinstance(of_inner, Mapping):
         raise InputError(f"{owner}: options = {of_inner!r} must be a table of the inner law's options")
     inner = _INNER[values["law"]].make(axis_model, T, converter_range, unit=unit, **of_inner)
@@ -91,7 +84,7 @@ def make(
         "prediction": (whole, *parts),
     }
     start = (inner.initial_state, 0.0, 0.0, 0.0, (0.0,) * (whole + 1))
-    return Controller(control, start, params, Source(NAME))
+    return Controller(control, start, params, Source(NAME), retune=NOT_LIVE)
 
 
 def _later(r: Reference, time: float) -> Reference:

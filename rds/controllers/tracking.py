@@ -70,12 +70,6 @@ def observe(y: float, state: Any, following: Any, params: Mapping[str, Any]) -> 
     return (params["L"] * y + state[0] if state[1] else 0.0,)
 
 
-def estimated_velocity(y: float, state: tuple[float, float], params: Mapping[str, Any]) -> float:
-    """The velocity (mm/s) that the observer sees at measured position `y` when `state` is handed in with it."""
-    z, started = state
-    return params["L"] * y + z if started else 0.0
-
-
 def make(
     axis_model: Mapping[str, Any], T: float, converter_range: float, *, unit: str = "mm", **options: Any
 ) -> Controller:

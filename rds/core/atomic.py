@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -71,6 +72,7 @@ def _sync_directory(directory: Path) -> None:
         return  # Windows does not open directories; its rename is durable enough for a result
     handle = os.open(directory, os.O_RDONLY)
     try:
-        os.fsync(handle)
+        with suppress(OSError):  # the files are there, and some disks, as of a network, do this by themselves
+            os.fsync(handle)
     finally:
         os.close(handle)

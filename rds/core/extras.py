@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.installed import install_command
@@ -65,21 +65,26 @@ def there(module: str) -> bool:
 
 @contextmanager
 def needed_for(what: str, instead: str = "", where: str | None = None) -> Iterator[None]:
-    """Around an import of a package of an extra: InputError that `what` needs it, where it is missing.
-
-    So too where a file of the user's has its name: a law called control.py, beside the notebook that designs one.
-    """
+    """Around an import of a package of an extra: InputError that `what` needs it, where it is missing."""
     try:
         yield
-        file = getattr(sys.modules.get("control"), "__file__", None)
-        if file and Path(file).name == "control.py":  # the package's is its __init__.py
-            raise InputError(
-                f"{what} needs the package control, and this file is found in its place: rename it and start Python "
-                "anew",
-                file,
-            )
     except ModuleNotFoundError as error:
         name = error.name or ""
         if name.partition(".")[0] not in _PACKAGES:
             raise
         raise missing(name, what, instead, where) from error
+
+
+def python_control(what: str) -> Any:
+    """The package control, which `what` needs. InputError where it is missing, or where a file of the user's is found
+    in its place: a law called control.py, beside the notebook that designs one.
+    """
+    with needed_for(what):
+        import control
+    file = control.__file__
+    if file and Path(file).name == "control.py":  # the package's is its __init__.py
+        raise InputError(
+            f"{what} needs the package control, and this file is found in its place: rename it and start Python anew",
+            file,
+        )
+    return control

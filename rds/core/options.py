@@ -22,3 +22,14 @@ def read_options(given: Mapping[str, Any], options: Mapping[str, Quantity], owne
     """The options that were given, as checked floats. Raises InputError for an unknown name or a bad value."""
     check_known(given, options, owner)
     return {name: options[name].check(value, name, owner) for name, value in given.items()}
+
+
+def read_all(
+    given: Mapping[str, Any], options: Mapping[str, Quantity], owner: str, defaults: Mapping[str, float]
+) -> dict[str, float]:
+    """Every option, those not given from `defaults`. InputError as `read_options`, and for one that is in neither."""
+    values = {**defaults, **read_options(given, options, owner)}
+    for name, option in options.items():
+        if name not in values:
+            raise InputError(f"{owner} needs {name} ({option.described})")
+    return values

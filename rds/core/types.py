@@ -80,7 +80,7 @@ class Controller:
     With `coupled`, one law drives all axes: reference, position and voltage are arrays in axis order.
     `tunable` are those of its parameters that may be changed while it runs, with what each means and its bounds, and
     `retune(values of all of them)` gives the parameters that follow from new values, or raises InputError. Without
-    `retune`, any number in `params` may be changed and is handed to `control` as it is.
+    `retune`, any number in `params` may be changed and is handed to `control` as it is; with NOT_LIVE, none.
     One that is not `repeatable` answers differently when a run is gone through again, such as a person's loop.
     `conclude(axis, unit, its recorded signals by name, params)` gives a sentence for the notes of the run.
     `sample_period` is the one that its numbers were made for, s, where it says so: a run of another one tells it.
@@ -140,6 +140,10 @@ class Model:
         if self.output is None:
             return x[0]
         return self.output(x, t=t, params=params) if self.timed else self.output(x)
+
+
+NOT_LIVE: Callable[[Mapping[str, float]], Mapping[str, Any]] = dict
+"""The `retune` of a law that follows from its parameters as a whole, before it runs: nothing in them is `tunable`."""
 
 
 def _named(part: Controller | Model) -> str:

@@ -97,7 +97,9 @@ class Address:
             raise InputError("is there and is no socket; name another path", str(path))
         try:
             self.connect(1.0).close()
-        except OSError:
+        except ConnectionRefusedError:
             path.unlink()
             return
+        except OSError:  # it listens, and is too busy to answer
+            pass
         raise InputError("another server of jobs listens there; stop it, or give --socket PATH", str(path))

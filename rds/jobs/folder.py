@@ -26,7 +26,7 @@ class Folder:
     def file(self, name: str) -> Path:
         """The file of this name. InputError for one that is not there, or outside of the folder, be it by a link."""
         found = self._named(name)
-        if not found.is_file():
+        if not _is_there(found):
             raise InputError(f"file = {name!r} is no file in {self.path}")
         return found
 
@@ -65,10 +65,10 @@ class Folder:
                 named = path.parent / word
                 if key in _NO_FILES or "\0" in word or len(word) > 4096:
                     continue
-                if "/" not in word and "\\" not in word and not named.is_symlink() and not named.is_file():
+                if "/" not in word and "\\" not in word and not _is_there(named):
                     continue  # a name of the library
                 named = self._inside(named, f"{path.name}: {key} = {word!r}")
-                if named.suffix == ".toml" and named.is_file() and named not in seen:
+                if named.suffix == ".toml" and _is_there(named) and named not in seen:
                     todo.append(named)
 
     def results(self, name: str) -> Path:
@@ -93,6 +93,14 @@ class Folder:
         if not found.is_relative_to(self.path):
             raise InputError(f"{what} leads out of the served folder; jobs may only use files in {self.path}")
         return found
+
+
+def _is_there(path: Path) -> bool:
+    """Whether it is a file, or a link to anything; a text too long for a name is none."""
+    try:
+        return path.is_symlink() or path.is_file()
+    except OSError:
+        return False
 
 
 def _texts(value: Any, key: str = "") -> Iterator[tuple[str, str]]:

@@ -8,6 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rds.core.channel_name import channel_name
 from rds.core.errors import InputError
 from rds.core.quantities import Flag, Items, Quantity, Table, Text, near, shortened
 from rds.core.shared_quantities import NODE, SAMPLE_PERIOD
@@ -177,6 +178,11 @@ class Machine:
     def __repr__(self) -> str:
         axes = ", ".join(f"{axis.name} in {axis.unit}" for axis in self.axes.values())
         return f"<Machine {self.name}: {axes}; {self.sample_period:g} s>"
+
+    @property
+    def channel(self) -> str:
+        """Where its modules meet if no channel is named: its name, or one made of it where no channel can have that."""
+        return channel_name(self.name)
 
     @cached_property
     def kinematics(self) -> Kinematics:

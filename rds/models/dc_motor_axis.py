@@ -19,8 +19,7 @@ from collections.abc import Mapping, Sequence
 from math import expm1, pi
 from typing import Any
 
-from rds.core.errors import InputError
-from rds.core.options import read_options
+from rds.core.options import read_all
 from rds.core.quantities import Quantity
 from rds.core.types import Model, Source
 
@@ -63,8 +62,8 @@ def coefficients(params: Mapping[str, Any], T: float) -> Coefficients:
     slow, fast = half + root, half - root
     if root.imag == 0.0:
         slow = determinant / fast  # without the cancellation of half + root
-    spread, here = _divided(slow, fast, T).real, _divided(slow, fast, T)
-    start = (exp(slow * T) - here * slow).real  # e^(MT) = start I + spread M
+    here = _divided(slow, fast, T)
+    start, spread = (exp(slow * T) - here * slow).real, here.real  # e^(MT) = start I + spread M
     e11, e12, e21, e22 = start + spread * m11, spread * m12, spread * m21, start + spread * m22
     # M⁻¹ (e^(MT) - I), of which both rows times the input 1/L in the second place give the answer to u
     s11, s12 = _solved(m22, -m12, determinant, e11 - 1.0, e21), _solved(m22, -m12, determinant, e12, e22 - 1.0)
@@ -92,11 +91,12 @@ def _moved(x: Sequence[float], u: float, rows: Coefficients) -> tuple[float, ...
 class DcMotorMotion:
     """The axis in motion in a loop with a fixed sample period: `contracts.Motion`."""
 
-    __slots__ = ("_rows", "current", "position", "velocity")
+    __slots__ = ("_params", "_rows", "current", "position", "velocity")
+    dead_time = 0.0
 
     def __init__(self, model: Model, T: float):
         self.position, self.velocity, self.current = (float(value) for value in model.initial_state)
-        self._rows = coefficients(model.params, T)
+        self._params, self._rows = model.params, coefficients(model.params, T)
 
     def read(self) -> float:
         """Position, mm."""
@@ -104,8 +104,15 @@ class DcMotorMotion:
 
     def write(self, voltage: float) -> None:
         """Move on by one sample of constant `voltage`, V."""
+        self._go(voltage, self._rows)
+
+    def move(self, voltage: float, time: float) -> None:
+        """Move on by `time` s of constant `voltage`, V."""
+        self._go(voltage, coefficients(self._params, time))
+
+    def _go(self, voltage: float, rows: Coefficients) -> None:
         state = (self.position, self.velocity, self.current)
-        self.position, self.velocity, self.current = _moved(state, voltage, self._rows)
+        self.position, self.velocity, self.current = _moved(state, voltage, rows)
 
 
 def torque(current: float, params: Mapping[str, Any]) -> float:
@@ -124,10 +131,7 @@ def make(**params: Any) -> Model:
     The model's `tau` (s) and `K` ((mm/s)/V), which controllers are designed for, follow: those of the slow part,
     (J R + b L)/(b R + k²) and k h/(2π)/(b R + k²). Raises InputError for an unknown, missing or impossible parameter.
     """
-    values = _NEUTRAL | read_options(params, PARAMETERS, NAME)
-    for name, option in PARAMETERS.items():
-        if name not in values:
-            raise InputError(f"{NAME} needs {name} ({option.described})")
+    values = read_all(params, PARAMETERS, NAME, _NEUTRAL)
     R, L, k, J, b = (values[name] for name in ("resistance", "inductance", "torque_constant", "inertia", "damping"))
     stiffness = b * R + k * k
     derived = {"tau": (J * R + b * L) / stiffness, "K": k * values["lead"] / (2.0 * pi * stiffness)}

@@ -12,8 +12,7 @@ from collections.abc import Mapping, Sequence
 from math import expm1, log1p
 from typing import Any
 
-from rds.core.errors import InputError
-from rds.core.options import read_options
+from rds.core.options import read_all
 from rds.core.quantities import Quantity
 from rds.core.types import Model, Source
 
@@ -62,8 +61,5 @@ def make(**params: Any) -> Model:
 
     Raises InputError for an unknown, missing or impossible parameter.
     """
-    values = _NEUTRAL | read_options(params, PARAMETERS, NAME)
-    for name, option in PARAMETERS.items():
-        if name not in values:
-            raise InputError(f"{NAME} needs {name} ({option.described})")
+    values = read_all(params, PARAMETERS, NAME, _NEUTRAL)
     return Model(advance, (0.0, 0.0), values, source=Source(NAME), has_velocity=True)

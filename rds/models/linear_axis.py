@@ -13,8 +13,7 @@ from collections.abc import Mapping, Sequence
 from math import exp, expm1, log1p
 from typing import Any
 
-from rds.core.errors import InputError
-from rds.core.options import read_options
+from rds.core.options import read_all
 from rds.core.quantities import Quantity
 from rds.core.types import Model, Source
 
@@ -115,9 +114,6 @@ def make(**params: Any) -> Model:
 
     Raises InputError for an unknown, missing or impossible parameter.
     """
-    values = {"friction_plus": 0.0, "friction_minus": 0.0} | read_options(params, PARAMETERS, "linear-axis")
-    for name, option in PARAMETERS.items():
-        if name not in values:
-            raise InputError(f"linear-axis needs {name} ({option.described})")
+    values = read_all(params, PARAMETERS, "linear-axis", {"friction_plus": 0.0, "friction_minus": 0.0})
     source = Source("linear-axis")
     return Model(advance, (0.0, 0.0), values, source=source, motion=LinearAxisMotion, has_velocity=True)

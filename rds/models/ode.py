@@ -8,7 +8,7 @@ Coulomb friction's does, falls to first order in the sample of the jump: then wr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from functools import partial
 from typing import Any
 
@@ -130,6 +130,8 @@ def _flat(answer: Any) -> np.ndarray:
     except (TypeError, ValueError):
         pass
     try:
+        if isinstance(answer, Set | Mapping):  # which have no order of their own
+            raise TypeError
         # [x[1], (K*u - x[1])/tau] holds a number and an array of one, as u is one.
         return np.concatenate([_numbers(part) for part in answer])
     except (TypeError, ValueError):

@@ -10,7 +10,7 @@ that the deviation e = x - d obeys τ ë + ė + k e = 0 within the sample, and t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import cos, cosh, exp, sin, sinh, sqrt
+from math import cos, exp, expm1, sin, sqrt
 from typing import Any
 
 from rds.core.options import read_options
@@ -30,12 +30,12 @@ def settle(e: float, rate: float, T: float, gain: float, tau: float) -> tuple[fl
     square = half * half - gain / tau
     root = sqrt(abs(square))
     if root * T < 1e-9:  # both poles at -1/(2τ)
-        even, odd = 1.0, T
-    elif square > 0.0:
-        even, odd = cosh(root * T), sinh(root * T) / root
+        even, odd, decay = 1.0, T, exp(-half * T)
+    elif square > 0.0:  # poles far apart: the slow one leads, and the other's part may be nothing
+        gone = -expm1(-2.0 * root * T)
+        even, odd, decay = 1.0 - 0.5 * gone, 0.5 * gone / root, exp(-(gain / tau) / (half + root) * T)
     else:
-        even, odd = cos(root * T), sin(root * T) / root
-    decay = exp(-half * T)
+        even, odd, decay = cos(root * T), sin(root * T) / root, exp(-half * T)
     return (
         decay * (e * even + (rate + half * e) * odd),
         decay * (rate * even - (gain / tau * e + half * rate) * odd),

@@ -13,8 +13,7 @@ from collections.abc import Mapping, Sequence
 from math import exp
 from typing import Any
 
-from rds.core.errors import InputError
-from rds.core.options import read_options
+from rds.core.options import read_all
 from rds.core.quantities import Quantity
 from rds.core.types import Model, Source
 from rds.models.machine_model import split_delay
@@ -87,8 +86,5 @@ def make(**params: Any) -> Model:
 
     Raises InputError for an unknown, missing or impossible parameter.
     """
-    values = _NEUTRAL | read_options(params, PARAMETERS, "spindle")
-    for name, option in PARAMETERS.items():
-        if name not in values:
-            raise InputError(f"spindle needs {name} ({option.described})")
+    values = read_all(params, PARAMETERS, "spindle", _NEUTRAL)
     return Model(advance, (0.0,), values, source=Source("spindle"), motion=SpindleMotion)

@@ -9,6 +9,7 @@ import numpy as np
 
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import ContractError
+from rds.core.interrupt import Endless
 from rds.core.load import StudentFile
 from rds.core.signature import form
 from rds.core.types import Model
@@ -48,6 +49,8 @@ def _check_default_state(
     try:
         answer = advance(x, u, 1e-3, params) if advance else functions["derivatives"](0.0, x, u, params)
         size = len(answer)
+    except Endless as error:
+        raise ContractError(student_error(error, student.source), where) from error
     except (IndexError, TypeError, ValueError) as error:
         said = student_error(error, student.source)
         raise ContractError(f"{missing}: {said}; define initial_state with one number for each state", where) from error

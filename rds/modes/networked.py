@@ -36,8 +36,9 @@ class Links:
             self.arrived.append(arrived)
         self.held = [0.0] * len(plan.axes)  # V, acting now
         self.offsets = [0.0] * len(plan.axes)  # samples into the period at which the law runs
-        first = plan.axes[0].controller
-        self._together = first is not None and first.coupled
+        self._together = [  # the axes of one law
+            i for i, axis in enumerate(plan.axes) if axis.controller is not None and axis.controller.coupled
+        ]
         self._events: list[list[tuple[float, float]]] = [[] for _ in plan.axes]  # of a plant with a dead time
         self._dead: list[float] = [0.0] * len(plan.axes)
 
@@ -47,7 +48,7 @@ class Links:
         held, offsets, axes = self.held, self.offsets, range(len(self.held))
         ages, dead, events = [0.0] * len(held), self._dead, self._events
         measured_now = [0.0] * len(held)
-        is_together = self._together and len(held) > 1
+        together = self._together
         told: list[float] = []
         if len(held) == 1 and not dead[0]:
             return self._around_one(read, write, follow)
@@ -60,9 +61,9 @@ class Links:
                 measured_now[i] = positions[i]
                 ages[i] = y.age + offsets[i]
                 measured.append(y)
-            if is_together:  # one law for all axes waits for the last measurement
-                latest = max(offsets)
-                for i in axes:
+            if together:  # their law waits for the last of their measurements
+                latest = max(offsets[i] for i in together)
+                for i in together:
                     ages[i] += latest - offsets[i]
                     offsets[i] = latest
             return measured

@@ -22,6 +22,7 @@ from rds.references.signal import Motion, Signal
 
 LINES = ("all", "odd")
 _MOST_LINES = 2000
+_HIGHEST = 1e6  # multiple: the peak is looked for in a whole base period, with some points for each oscillation
 _PER_PERIOD = 16  # points of the fastest sinusoid's period at which the peak is looked for
 OPTIONS: Mapping[str, Declaration] = {
     "amplitude": Quantity("middle to peak", "V or mm", low=0.0),
@@ -47,9 +48,13 @@ def multisine(
     )
     checked(OPTIONS["lines"], lines, "lines", "multisine")
     base = settings["frequency"]
-    multiples = np.arange(ceil(settings["lowest"] / base - 1e-9), floor(settings["highest"] / base + 1e-9) + 1)
-    if lines == "odd":
-        multiples = multiples[multiples % 2 == 1]
+    if settings["highest"] / base > _HIGHEST:
+        raise InputError(
+            f"multisine: highest = {settings['highest']:g} Hz is more than {_HIGHEST:g} times frequency = {base:g} Hz; "
+            "give a higher `frequency`"
+        )
+    first, last = max(ceil(settings["lowest"] / base - 1e-9), 1), floor(settings["highest"] / base + 1e-9)
+    multiples = np.arange(first, last + 1) if lines == "all" else np.arange(first | 1, last + 1, 2)
     if not 1 <= len(multiples) <= _MOST_LINES:
         raise InputError(
             f"multisine: {len(multiples)} {lines if lines == 'odd' else ''} multiples of {base:g} Hz lie between "

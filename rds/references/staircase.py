@@ -25,17 +25,12 @@ def staircase(amplitude: float, frequency: float, steps: int, offset: float = 0.
     """
     given = {"amplitude": amplitude, "frequency": frequency, "steps": steps, "offset": offset}
     settings = {name: OPTIONS[name].check(value, name, "staircase") for name, value in given.items()}
-    count = settings["steps"]
-    levels = np.concatenate([np.arange(count), np.arange(count, -count, -1), np.arange(-count, 0)]) / count
-    motion = partial(
-        _staircase,
-        levels=settings["offset"] + settings["amplitude"] * levels,
-        frequency=settings["frequency"],
-    )
-    fastest = len(levels) * 0.5 * settings["frequency"]  # every level needs a sample
+    motion = partial(_staircase, **settings)
+    fastest = 2.0 * settings["steps"] * settings["frequency"]  # every level needs a sample
     return Signal("staircase", motion, 1.0 / settings["frequency"], settings, fastest=fastest)
 
 
-def _staircase(t: np.ndarray, levels: np.ndarray, frequency: float) -> Motion:
-    at = np.floor(t * frequency * len(levels) + _EDGE).astype(int) % len(levels)
-    return levels[at], np.zeros_like(t), np.zeros_like(t)
+def _staircase(t: np.ndarray, amplitude: float, frequency: float, steps: int, offset: float) -> Motion:
+    since_lowest = np.floor(t * frequency * 4 * steps + _EDGE) + steps
+    level = (steps - np.abs(since_lowest % (4 * steps) - 2 * steps)) / steps
+    return offset + amplitude * level, np.zeros_like(t), np.zeros_like(t)

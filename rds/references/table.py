@@ -22,6 +22,7 @@ from rds.references.rows import read_rows
 from rds.references.signal import Motion, Signal
 
 INTERPOLATIONS = ("spline", "linear", "hold")
+_EDGE = 1e-9  # of the distance to it: from there on a row, or a period, counts as reached, as sample times are rounded
 
 
 def table_signal(file: str | Path, interpolation: str | None = None, period: float | None = None) -> Signal:
@@ -64,8 +65,9 @@ def _motion(
     values: np.ndarray,
     period: float | None,
 ) -> Motion:
-    if period is not None:
-        t = times[0] + np.mod(t - times[0], period)
+    if period is not None:  # a sample that should be at a beginning is not taken for the end before it
+        periods = np.floor((t - times[0]) / period + _EDGE)
+        t = times[0] + np.maximum(t - times[0] - periods * period, 0.0)
     within = (t >= times[0]) & (t <= times[-1])
     still = np.where(t < times[0], values[0], values[-1])
     position, velocity, acceleration = inside(np.clip(t, times[0], times[-1]))
@@ -84,8 +86,7 @@ def _between(interpolation: str, times: np.ndarray, values: np.ndarray) -> Calla
 
 
 def _row_before(t: np.ndarray, times: np.ndarray) -> np.ndarray:
-    # Sample times k T carry rounding errors: a row counts as reached from 1e-9 of its distance before it.
-    edge = 1e-9 * np.min(np.diff(times))
+    edge = _EDGE * np.min(np.diff(times))
     return np.clip(np.searchsorted(times, t + edge, side="right") - 1, 0, len(times) - 1)
 
 

@@ -144,9 +144,11 @@ def test_each_error_costs_its_frame_and_the_longest_frame_again() -> None:
 def test_errors_alone_can_overload_a_bus() -> None:
     table = in_order([Message("a", 1, False, 8, 1e-3)])
     assert responses(table, 1_000_000, errors=Errors(interval=1e-3))[0].time == (135 + 31 + 135) * 1000
+    assert responses(table, 1_000_000, errors=Errors(1.0)) == responses(table, 1_000_000, errors=Errors(1))  # type: ignore[arg-type]
     assert "and errors ask for" in responses(table, 1_000_000, errors=Errors(interval=190e-6))[0].reason
-    with pytest.raises(InputError, match="burst is 1 or more"):
-        Errors(burst=0)
+    for wrong in ({"burst": 0}, {"burst": 1.5}, {"interval": 1e-10}):
+        with pytest.raises(InputError, match="burst is a whole number of 1 or more, and the interval at least 1e-9 s"):
+            Errors(**wrong)
 
 
 @given(st.integers(0, 10**9), st.integers(1, 5), st.sampled_from([inf, 1e-3, 0.1]))

@@ -181,6 +181,23 @@ def test_on_the_wire_a_duplicate_is_an_error_in_the_last_bit() -> None:
     assert medium.stations["A"].counters.tec == 7 and medium.errors == 1
 
 
+def test_a_frame_that_is_lost_twice_is_counted_once(medium: Medium[str]) -> None:
+    hand = Hand(medium)
+    hand.inject("hang", node="B", duration=1.0)
+    hand.inject("lose")
+    medium.offer("A", record(1), 0)
+    assert heard(medium, SECOND // 2) == [(1, "")]
+    assert [medium.stations[name].lost for name in "ABC"] == [0, 1, 1]
+
+
+@pytest.mark.parametrize("end", ["die", "leave"])
+def test_a_delayed_frame_goes_with_its_sender(medium: Medium[str], end: str) -> None:
+    Hand(medium).inject("delay", by=0.25)
+    medium.offer("A", record(1), 0)
+    getattr(medium, end)("A", SECOND // 8)
+    assert heard(medium, SECOND) == []
+
+
 def test_delayed_frames_come_later_and_others_pass(medium: Medium[str]) -> None:
     Hand(medium).inject("delay", by=0.25, identifier=1)
     medium.offer("A", record(1), 0)

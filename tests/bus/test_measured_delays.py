@@ -255,6 +255,14 @@ def test_a_log_of_answers_alone_has_no_delays() -> None:
     assert "no message of the log has a delay that can be measured" in said
 
 
+def test_a_frame_with_and_without_the_bit_rate_switch_takes_two_times() -> None:
+    table = [Message("a", 0x100, False, 64, 0.001, fd=True)]
+    fast = [frame(0x100, 0.001 * k, bytes(64), is_fd=True, bitrate_switch=k % 2 == 0) for k in range(40)]
+    found = of_frames(analyse_messages(table, 500_000, 4_000_000), fast)
+    slow = frame_bits(0x100, bytes(64), fd=True).time(500_000, 4_000_000, interframe=True)
+    assert found.row("a").largest == pytest.approx(slow * 1e-9, abs=1e-6)
+
+
 def test_frames_of_one_instant_have_no_delays() -> None:
     found = of_frames(cnc(), [frame(0x010, 5.0) for _ in range(30)])
     assert found.row("command").extra == 29

@@ -73,7 +73,12 @@ def test_a_period_for_those_without_one(tmp_path: Path) -> None:
     [
         ("identifier,period_ms\n1,8\n", "no column length"),
         ("identifier,period,length\n1,8,8\n", "has the column 'period'"),
-        ("identifier,period_ms,period_s,length\n1,1,1,8\n", "given twice"),
+        ("identifier,period_ms,period_s,length\n1,1,1,8\n", "a.csv:1: period is given twice"),
+        ("identifier,length,period_ms,length\n1,8,1,4\n", "a.csv:1: length is given twice"),
+        ("identifier,length,period_ms\n1,8,1\n2,99,1\n", "a.csv:3: message '0x2': 99 bytes with dlc 99 are no classic"),
+        ("identifier,length,period_ms\n1,-1,1\n", "a.csv:2: message '0x1': -1 bytes"),
+        (f"identifier,length,period_ms,name\n1,8,1,{'x' * 200_000}\n", "a.csv:2: the line cannot be read"),
+        ("identifier,length,period_us\n1,8,0.0001\n", "a.csv:2: .* must be at least 1e-9 and less than 1e6"),
         ("identifier,period_ms,length\n1,10,8\nfast,10,8\n", ":3: identifier 'fast'"),
         ("identifier,period_ms,length\n1,10\n", ":2: the line has 2 columns"),
         ("identifier,period_ms,length\n# one\n\n1,10,8\nfast,10,8\n", ":5: identifier 'fast'"),

@@ -7,12 +7,15 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from rds.bus.hub.address import Address
 from rds.bus.hub.runtime_folder import runtime_directory
 from rds.core.errors import Notice
+from rds.machines import load_machine
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs owners and modes of files")
 
@@ -120,3 +123,10 @@ def test_the_command_line_says_a_notice_as_a_note(usual: Path) -> None:
     words = [sys.executable, "-m", "rds", "bus", "nodes", "--channel", "nobody"]
     said = subprocess.run(words, capture_output=True, text=True).stderr
     assert f"rds: note: {usual} is no folder" in said and "Notice" not in said
+
+
+@pytest.mark.parametrize("name", ["Große Fräse", "a" * 33, "../x", "_", "ä", "mini cnc"])
+def test_a_machine_of_any_name_has_a_channel_of_its_own(name: str) -> None:
+    named = replace(load_machine("mini-cnc"), name=name)
+    assert Address(named.channel).channel == named.channel != replace(named, name=f"{name}2").channel
+    assert load_machine("mini-cnc").channel == "mini-cnc"

@@ -49,6 +49,13 @@ def test_the_loop_settles_with_equal_poles_too() -> None:
     assert settle(1.0, 0.0, 0.02, 25.0, tau)[0] == pytest.approx(exp(-1.0) * 2.0, rel=1e-12)
 
 
+@pytest.mark.parametrize("tau", [1e-9, 1e-6, 1e-5])
+def test_a_velocity_loop_that_is_as_good_as_perfect_leaves_the_position_loop(tau: float) -> None:
+    """ė = -gain e, however long the sample is."""
+    e, rate = settle(1.0, -100.0, 0.05, 100.0, tau)
+    assert (e, rate) == pytest.approx((exp(-5.0), -100.0 * exp(-5.0)), rel=0.01)
+
+
 def test_a_drive_led_by_positions_follows_a_ramp_without_error() -> None:
     """The demand's slope is fed forward: what is left is the start."""
     model = library_model("position-drive")

@@ -13,7 +13,7 @@ from control_loops import POLES, RANGE, T, axis_model, plant, ramp, run, step
 
 from rds.controllers import library_controller, observer
 from rds.controllers.design import observer_parameters, tracking_gains
-from rds.controllers.tracking import control, estimated_velocity
+from rds.controllers.tracking import control, observe
 from rds.core.errors import InputError
 from rds.core.types import Controller, Reference
 
@@ -87,7 +87,7 @@ def test_the_law_is_the_observer_and_equation_8():
     u, state = control(0.0, r, y, (z, 1.0), p)
     assert u == pytest.approx(expected, rel=1e-12)
     assert state == pytest.approx((observer.step(z, y, u, c)[1], 1.0))
-    assert estimated_velocity(y, (z, 1.0), p) == pytest.approx(estimate)
+    assert observe(y, (z, 1.0), (), p)[0] == pytest.approx(estimate)
 
 
 def test_the_observer_is_told_the_voltage_that_saturation_leaves():
@@ -97,7 +97,7 @@ def test_the_observer_is_told_the_voltage_that_saturation_leaves():
     worst = highest = 0.0
     for k in range(1500):
         y = motion.read()
-        worst = max(worst, abs(estimated_velocity(y, state, controller.params) - motion.velocity))
+        worst = max(worst, abs(observe(y, state, (), controller.params)[0] - motion.velocity))
         u, state = controller.control(k * T, Reference(20.0, 0.0, 0.0), y, state, controller.params)
         highest = max(highest, abs(u))
         motion.write(u)
@@ -110,7 +110,7 @@ def test_an_axis_at_rest_anywhere_gives_no_jerk_at_the_start(start):
     controller = tracking("X")
     u, state = controller.control(0.0, Reference(start, 0.0, 0.0), start, controller.initial_state, controller.params)
     assert abs(u) < 1e-9
-    assert abs(estimated_velocity(start, state, controller.params)) < 1e-9
+    assert abs(observe(start, state, (), controller.params)[0]) < 1e-9
 
 
 def test_without_saturation_nothing_is_limited():

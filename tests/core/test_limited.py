@@ -89,3 +89,11 @@ def test_the_line_is_named(text: str, where: str, tmp_path: Path) -> None:
             duration=0.5, reference=rds.sinusoid(2.0, 1.0), controller={"file": str(tmp_path / "endless.py")}
         ).run("simulation")
     assert time.monotonic() - began < 10.0
+
+
+def test_so_it_is_of_a_model_that_is_tried_for_its_states(tmp_path: Path) -> None:
+    (tmp_path / "endless.py").write_text("def derivatives(t, x, u, params):\n    while True: pass\n")
+    with pytest.raises(
+        rds.ContractError, match=r"endless\.py, line 2, in derivatives.* look for a loop without an end"
+    ):
+        rds.Experiment(reference=rds.sinusoid(2.0, 1.0), controller="p", model=tmp_path / "endless.py")

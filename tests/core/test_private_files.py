@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import errno
 import os
 import re
 import stat
@@ -177,6 +178,18 @@ def test_files_are_made_in_one_place() -> None:
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="this system has no /proc")
+def test_a_disk_that_cannot_sync_folders_keeps_files_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sync = os.fsync
+
+    def of_files(descriptor: int) -> None:
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "Invalid argument")
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", of_files)
+    assert write_whole(tmp_path / "result.csv", b"1").read_bytes() == b"1"
+
+
 def test_a_folder_where_nothing_can_be_made_is_an_error_of_the_system() -> None:
     """There the kernel says that it does not exist, and not that it may not be."""
     with pytest.raises(OSError):

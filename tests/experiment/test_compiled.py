@@ -103,6 +103,23 @@ def test_it_falls_back_with_a_note(alone: Path, monkeypatch: pytest.MonkeyPatch)
     assert note == f"not compiled: numba is not installed; install it with: {remedy('fast')}"
 
 
+@pytest.mark.parametrize("quantization", [True, False])
+@pytest.mark.parametrize("gain", [1e5, 1e300])
+def test_what_grows_beyond_all_numbers_is_told_as_by_the_loop(gain: float, quantization: bool) -> None:
+    words = {
+        "controller": {"name": "p", "Pgain": gain},
+        "reference": REFERENCES[0],
+        "interface": {"saturation": False, "quantization": quantization},
+        "duration": 2.0,
+    }
+    said = []
+    for compiled in (False, True):
+        with pytest.raises(rds.ContractError) as error:
+            rds.Experiment(**words, compiled=compiled).run()
+        said.append(str(error.value))
+    assert said[0] == said[1] and "at t = " in said[0]
+
+
 @pytest.mark.realtime
 def test_real_time_is_not_compiled_and_says_so(alone: Path) -> None:
     own = rds.Experiment(duration=0.2, reference=REFERENCES[0], controller="p", compiled=True)

@@ -45,6 +45,25 @@ def test_a_controller_with_signals_keeps_them() -> None:
     assert "X_compensation" in made and made.units["X_compensation"] == "mm"
 
 
+@pytest.mark.parametrize("signals, answer, says", [
+    ("", "1.0", r"returned 1.0 at t = 0.000 s \(axis X\); it must return \(voltage, next_state\) with"),
+    ("", "(1.0, state, {'a': 1.0})", r"must return \(voltage, next_state\), unless the file declares the third part"),
+    ("{'a': 'mm'}", "(1.0, state)", r"as signals declares a, it must return \(voltage, next_state, \{'a': ...\}\)"),
+    ("{'a': 'mm'}", "(1.0, state, 5.0)", r"the signals are 5.0; it must return \(voltage, next_state, \{'a': ...\}\)"),
+    ("{'a': 'mm'}", "(1.0, state, {})", r"the signals \{\} lack 'a'; it must return"),
+], ids=["no state", "not declared", "none told", "no table", "one lacks"])  # fmt: skip
+def test_what_the_law_answers_wrongly_is_said_of_the_law(tmp_path: Path, signals: str, answer: str, says: str) -> None:
+    """The signal `compensation` is not its business."""
+    declared = f"signals = {signals}\n" if signals else ""
+    (tmp_path / "law.py").write_text(f"{declared}def control(t, r, y, state, params):\n    return {answer}\n")
+    experiment = rds.Experiment(
+        reference=rds.sinusoid(1.0, 1.0), controller=tmp_path / "law.py", error_compensation={}, duration=0.01
+    )
+    with pytest.raises(rds.ContractError, match=says) as refused:
+        experiment.run()
+    assert "compensation" not in str(refused.value)
+
+
 def test_a_part_program_is_compensated_online(tmp_path: Path) -> None:
     (tmp_path / "part.ngc").write_text("G21 G90 G94 G61\nG1 X4 F200\nG1 X0\nM2\n")
     words = 'controller = "p"\n[error_compensation]\ntime = 0.05\n'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 import rds
+from rds.core.types import Ending
+from rds.modes import load_mode
 
 SINE = rds.sinusoid(5.0, 0.5)  # its speed is 15.7 mm/s at most
 
@@ -78,6 +81,14 @@ def test_the_last_sample_counts_as_the_others_do() -> None:
     assert len(result) == 1 and result.meta["ending"] == "following error"
 
 
+def test_so_it_is_where_all_periods_after_it_are_discarded() -> None:
+    plan = rds.Experiment(
+        following_error={"ferror": 0.5}, reference={"kind": "constant", "value": 2.0}, controller="p", duration=1.0
+    ).plan()
+    loop = replace(load_mode("simulation").build(plan, None), wait=lambda k: k and plan.samples)
+    assert loop.run() is Ending.FOLLOWING_ERROR and loop.changes is not None and "axis X" in loop.changes.reason
+
+
 def test_a_part_program_ends_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("part.ngc").write_text("G21 G90\nG1 X5 F600\nM2\n")
@@ -95,6 +106,9 @@ def test_a_spindle_is_not_watched() -> None:
     words: dict[str, Any] = {"axis": "spindle", "reference": {"kind": "constant", "value": 500.0}}
     result = rds.Experiment(controller="pid", duration=0.2, following_error={"ferror": 1.0}, **words).run()
     assert result.meta["ending"] == "done"
+    for key, table in (("following_error", {"ferror": 1.0}), ("error_compensation", {})):
+        with pytest.raises(rds.InputError, match=rf"\[axis.spindle.{key}\] is for position axes.*: remove it"):
+            rds.Experiment(controller="pid", duration=0.2, overrides={"spindle": {key: table}}, **words)
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,12 @@ def test_what_cannot_learn_is_refused(more: dict[str, Any], options: dict[str, A
         learn(experiment(**more), **options)
 
 
+def test_errors_are_told_in_the_axis_s_unit() -> None:
+    speed = {"kind": "constant", "value": 500.0}
+    learned = learn(rds.Experiment(axis="spindle", reference=speed, controller="pid", duration=0.1), 2.0)  # type: ignore[arg-type]
+    assert len(learned.results) == 2 and repr(learned).endswith(" rev/min>")
+
+
 @pytest.mark.realtime
 def test_it_learns_on_the_machine() -> None:
     learned = learn(experiment(model=None, sample_period=0.002), 3, mode="implementation")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,9 @@ import numpy as np
 import pytest
 
 import rds
+from rds.modes.experiment.outcome import outcome
+from rds.modes.loop.stopwatch import TIMING_COLUMNS
+from rds.modes.process.host import run_plan
 
 GOOD: dict[str, Any] = {"duration": 0.5, "reference": rds.sinusoid(2.0, 2.0), "controller": "p"}
 
@@ -194,3 +198,33 @@ def test_a_run_s_tables_are_written_once(alone: Path, monkeypatch: pytest.Monkey
     assert written == [Path("out")]
     assert all(path.is_file() for path in files.values())
     assert set(files) == {"csv", "json", "mat", "parquet", "plot_X", "report"}
+
+
+def test_what_a_machine_did_is_kept_where_the_run_cannot_be_simulated() -> None:
+    """The law of a model with the wrong sign gives up; beside the machine it did not."""
+
+    def control(t: float, r: Any, y: float, state: Any, params: Any) -> Any:
+        assert abs(y) < 3.0, "beyond the work"
+        return 30.0 * (r.position - y), state
+
+    words = GOOD | {"controller": control}
+    rows = run_plan(rds.Experiment(**words).plan(), None)
+    wrong = rds.Experiment(**words, model={"name": "linear-axis", "tau": 0.01, "K": -1.0}).plan()
+    report = {"drivers": {}, "environment": {}}
+    timed = np.insert(rows.values, [1] * len(TIMING_COLUMNS), 0.0, axis=1)
+    columns = [rows.columns[0], *TIMING_COLUMNS, *rows.columns[1:]]
+    of_machine = replace(rows, columns=columns, values=timed, report=report)
+    result = outcome(replace(wrong, mode="implementation"), of_machine, {"period": {"X": 0.5}})
+    assert (result["X_measured"] == rows.values[:, rows.columns.index("X_measured")]).all()
+    assert "X_simulated" not in result
+    (note,) = (note for note in result.meta["notes"] if "has no response to compare with" in note)
+    assert "AssertionError: beyond the work" in note
+
+
+def test_another_model_takes_the_place_of_the_axis_s_own() -> None:
+    own = {"controller": "p", "model": {"name": "linear-axis", "tau": 0.02, "K": 1.0}}
+    experiment = rds.Experiment(axis="X", duration=0.5, reference=rds.sinusoid(2.0, 2.0), overrides={"X": own})
+    other = experiment.with_model({"name": "linear-axis", "tau": 0.01, "K": 3.0})
+    assert [each.plan().axes[0].model.params["K"] for each in (experiment, other)] == [1.0, 3.0]
+    with pytest.raises(rds.InputError, match="it has several axes"):
+        rds.Experiment(**GOOD, axis=("X", "Y")).with_model("linear-axis")

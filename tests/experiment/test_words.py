@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -147,13 +148,6 @@ def test_what_is_wrong_is_named(alone: Path, change: str, line: int | None, said
     refused(alone, edit(change), line, said)
 
 
-def test_a_processor_is_chosen_only_where_the_system_can(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr("os.sched_setaffinity", raising=False)
-    (alone / "experiment.toml").write_text(edit("[timing]\ncpu = 0"))
-    with pytest.raises(RdsError, match="cpu = 0 cannot be chosen on this system, only on Linux; remove it"):
-        rds.Experiment.from_toml(alone / "experiment.toml")
-
-
 @pytest.mark.parametrize(
     ("file", "line", "said"),
     [
@@ -293,6 +287,16 @@ def test_files_are_looked_for_from_the_experiment_s_folder(
     result = rds.Experiment.from_toml(alone / "experiment.toml").run()
     assert (result["X_command"] == 1.0).all()
     assert result["X_reference"][500] == pytest.approx(0.5)
+
+
+def test_what_would_do_nothing_is_refused(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (alone / "m.py").write_text("def advance(x, u, T, params):\n    return [x[0] + T * u[0], u[0]]\n")
+    good: dict[str, Any] = {"reference": rds.sinusoid(5.0, 0.2), "controller": "p"}
+    with pytest.raises(rds.InputError, match=r"model.substeps = 20 is for derivatives\(\)"):
+        rds.Experiment(model={"file": "m.py", "substeps": 20}, **good)
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    with pytest.raises(rds.InputError, match=r"timing\.cpu = 0 cannot be chosen on this system, only on Linux; remove it"):
+        rds.Experiment(timing={"cpu": 0}, **good)
 
 
 def test_overrides_are_one_axis_s_own(alone: Path) -> None:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from waiting import wait_for
 import rds
 from rds.cli.main import app
 from rds.core.errors import InputError
+from rds.jobs.address import Address
 from rds.jobs.folder import Folder
 from rds.jobs.jobs import Jobs
 from rds.jobs.requests import VERBS, answer, parse, words_of
@@ -130,6 +132,33 @@ def test_strangers_and_too_many_clients_keep_nobody_out(serve: Serve) -> None:
     while not (taken := server.client()).ask(do="jobs")["ok"] and time.monotonic() < deadline:
         pass
     assert taken.ask(do="jobs")["ok"]
+
+
+def test_a_server_that_is_too_busy_to_answer_keeps_its_socket(tmp_path: Path) -> None:
+    address = Address.of(tmp_path / "jobs.sock")
+    with socket.socket(socket.AF_UNIX) as busy:
+        busy.bind(str(address.path))
+        busy.listen(0)
+        clients = [socket.socket(socket.AF_UNIX) for _ in range(3)]
+        for client in clients:
+            client.setblocking(False)
+            with suppress(BlockingIOError):
+                client.connect(str(address.path))
+        with pytest.raises(InputError, match="another server of jobs listens there"):
+            address.listen()
+        for client in clients:
+            client.close()
+    address.listen().close()  # that one has gone, and left it behind
+
+
+def test_texts_in_an_experiment_may_be_longer_than_names_of_files(tmp_path: Path) -> None:
+    law = "params = {'note': ''}\ndef control(t, r, y, state, params):\n    return 0.0, state\n"
+    (tmp_path / "law.py").write_text(law)
+    text = EXPERIMENT.format(controller='file = "law.py"\n[controller.params]\nnote = "' + 60 * "a word " + '"')
+    (tmp_path / "long.toml").write_text(text)
+    Folder(tmp_path).check_words(tmp_path / "long.toml")
+    with pytest.raises(InputError, match="is no file in"):
+        Folder(tmp_path).file("ä" * 200)
 
 
 def test_a_port_needs_the_secret_and_a_socket_may_do_without(serve: Serve, alone: Path) -> None:

@@ -224,6 +224,18 @@ def test_modules_of_their_own_process_make_the_same_part(motion: SerialMotion) -
     assert len(dry.error) and dry.course.missing == 0
 
 
+@pytest.mark.realtime
+def test_the_modules_of_a_machine_may_have_a_name_that_no_channel_can_have(
+    motion: SerialMotion, tmp_path: Path
+) -> None:
+    file = tmp_path / "fraese.toml"
+    file.write_text(
+        Path(CNC.path).read_text().replace('name = "mini-cnc"', 'name = "Große Fräse"', 1), encoding="utf-8"
+    )
+    dry = run_can_method("B", motion, load_machine(str(file)), mode="emulation")
+    assert len(dry.error) and dry.course.missing == 0
+
+
 def test_the_command_chooses_by_the_machine(tmp_path: Path) -> None:
     file = tmp_path / "line.ngc"
     file.write_text("G21 G90 F480 G61\nG1 X1\nM2\n")

@@ -107,6 +107,13 @@ def test_a_lost_measurement_widens_the_covariance_and_the_next_one_counts_more()
     assert state[5] > steady
 
 
+@pytest.mark.parametrize("name", ["lqg", "smith"])
+def test_nothing_of_a_law_that_is_designed_as_a_whole_changes_while_it_runs(name: str) -> None:
+    """Its numbers are there to be read: to set one of them would change nothing, or half of the law."""
+    plan = rds.Experiment(reference=rds.sinusoid(1.0, 1.0), controller={"name": name, "delay": 0.002}).plan()
+    assert [channel.name for channel in plan.channels()] == ["stop"]
+
+
 def test_a_constant_disturbance_is_compensated() -> None:
     result = run({"name": "lqg", "delay": 0.004}, {"actuator": {"kind": "constant", "delay": 0.004}},
                  model={"name": "linear-axis", "tau": TAU, "K": K, "friction_plus": 2.0, "friction_minus": -2.0},

@@ -144,6 +144,36 @@ def test_a_models_own_delay_comes_on_top(model: dict[str, Any]) -> None:
     assert result["X_measured"] == pytest.approx(expected, abs=1e-12)
 
 
+def test_a_motor_with_current_moves_behind_a_network_as_well() -> None:
+    """Without inductance and friction it is the linear axis."""
+    motor = {"name": "dc-motor-axis", "resistance": 1.0, "inductance": 0.0, "torque_constant": 0.1, "inertia": 1e-4}
+    network = {"actuator": {"kind": "constant", "delay": 0.0004}}
+    result = run(network, model=motor | {"lead": 0.2 * K * np.pi}, duration=0.1)
+    assert result["X_measured"] == pytest.approx(by_hand(0.4, result["X_command"]), abs=1e-12)
+
+
+@pytest.mark.parametrize("axes", [("X", "Y", "spindle"), ("spindle", "X", "Y")])
+def test_one_law_waits_for_the_last_of_its_own_measurements(axes: tuple[str, ...]) -> None:
+    """And not for that of an axis with a law of its own."""
+
+    def control(t: float, r: Any, y: Any, state: Any, params: Any) -> tuple[Any, Any]:
+        return 0.0 * y, state
+
+    delay = {"kind": "uniform", "low": 0.0, "high": 0.0009}
+    steady: dict[str, Any] = {"controller": "p", "model": "spindle", "reference": {"kind": "constant", "value": 0.0}}
+    result = rds.Experiment(
+        axis=axes,
+        duration=0.05,
+        reference=rds.sinusoid(1.0, 1.0),
+        controller={"control": control, "coupled": True},
+        overrides={"spindle": steady},
+        network={"event": True, "sensor": delay},
+    ).run()
+    waited = {name: result[f"{name}_delay_sc"] for name in axes}
+    assert waited["X"] == pytest.approx(waited["Y"], abs=1e-12)
+    assert np.abs(waited["spindle"] - waited["X"]).min() > 1e-9
+
+
 def test_the_age_of_a_measurement_is_told_to_the_law() -> None:
     seen = []
 

@@ -185,6 +185,23 @@ def test_a_hold_on_the_way_home_keeps_the_limits(at: float, until: float) -> Non
     assert (ran.position[-1] == 0.0).all()
 
 
+def test_time_stands_still_while_it_is_held_on_the_way_home() -> None:
+    program = whole().program
+    execution = Execution(
+        program, T, RetimedProgram(program, T), [LiveReference() for _ in range(4)], 3, 1.0, lambda names: True
+    )
+    change = execution.actions()
+    waited = []
+    for k in range(1500):
+        for sample, name, value in ((600, "home", 1.0), (800, "hold", 1.0), (1400, "hold", 0.0)):
+            if k == sample:
+                change[name](value)
+        waited.append(execution.waits())
+        execution.law(k, [0.0] * 4, [], [])
+    held = np.flatnonzero(waited)
+    assert 800 < held[0] < 1200 and (np.diff(held) == 1).all() and held[-1] == 1399
+
+
 def test_a_hold_that_nobody_can_end_ends_the_run() -> None:
     ran = execute(whole(), [(0.5, "hold", 1)])
     assert ran.ending is Ending.STOPPED

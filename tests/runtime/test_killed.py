@@ -23,11 +23,12 @@ from waiting import wait_for
 
 import rds
 from rds.bus.hub.address import runtime_directory
-from rds.bus.hub.command import Command, remove_left
+from rds.bus.hub.command import Command, commanded, remove_left
 from rds.bus.modules.calling import find_machine
 from rds.bus.modules.dialects import server_module
 from rds.bus.modules.rds.frames import CALL, Kind, Status, answer_identifier, decode_answer
 from rds.bus.modules.server_process import start_server
+from rds.modes.loop.changes import stop_channel
 from rds.modes.loop.live_values import LiveValues
 from rds.modes.process import recorder
 from rds.modes.process.recorder import READY, Recorder, conclude, watch
@@ -208,6 +209,27 @@ def test_the_command_of_a_killed_run_is_cleared_away(alone: Path, monkeypatch: p
     with Command("living"):
         remove_left()
         assert [path.name for path in folder.glob("*.command")] == ["living.command"]
+
+
+def test_what_an_earlier_run_without_a_recorder_left_is_not_taken_for_this_one_s(tmp_path: Path) -> None:
+    """Here the target is a module of Python's that ends at once."""
+    about = {"run": "1", "ready": READY, "sample_period": 0.001, "samples": 10, "units": {}}
+    ring = Ring.create(tmp_path / "rds-0.ring", ["sample"], 10, **about)
+    LiveValues.create(ring.live_values_path, [stop_channel()]).close()
+    (tmp_path / "target.json").write_text('{"ending": "done", "reason": ""}')
+    command = [sys.executable, "-P", "-m", "rds.modes.process.recorder", str(tmp_path), str(ring.path), "keyword"]
+    subprocess.run(command, check=True)
+    ring.close()
+    assert json.loads((tmp_path / "unstarted.json").read_text())["ending"] == "killed"
+
+
+def test_who_only_looks_keeps_nobody_from_the_command(alone: Path) -> None:
+    looks = Command("own")
+    assert looks.acquire() and commanded("own")
+    given_back = threading.Timer(0.02, looks.release)
+    given_back.start()
+    with Command("own"):
+        given_back.join()
 
 
 def test_a_machine_that_is_killed_before_it_is_there(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -216,7 +216,10 @@ def test_coupled_controllers_have_live_values_too() -> None:
     [
         ((0.1, "X.Kp", 1.0), "no live value 'X.Kp'; this run has X.Pgain, "),
         ((0.1, "X.Pgain", -1.0), "X.Pgain = -1.0 must be at least 0 V/mm"),
-        ((-0.1, "X.Pgain", 1.0), "its time must be a number of at least 0 s"),
+        ((-0.1, "X.Pgain", 1.0), r"its time must be from 0 to 1e\+09 s"),
+        ((1e308, "X.Pgain", 1.0), r"its time must be from 0 to 1e\+09 s"),
+        ((10**400, "X.Pgain", 1.0), "its time must be a finite number in s"),
+        ((2.0, "X.Pgain", 1.0), "the change of X.Pgain at 2 s comes after the run, which lasts 2 s; make it earlier"),
         (("X.Pgain", 1.0), r"must be \(time in s, name, value\)"),
     ],
 )

@@ -46,6 +46,12 @@ def test_a_ring_is_removed_when_the_last_of_its_processes_is_killed(
     assert set(tmp_path.iterdir()) == set()
 
 
+def test_more_columns_than_can_be_described_are_refused(tmp_path: Path) -> None:
+    columns = [f"X_a_signal_with_a_long_name_{k}" for k in range(500)]
+    with pytest.raises(InputError, match=r"the run's 500 columns take .* let controllers declare fewer signals"):
+        Ring.create(tmp_path / "rds-0.ring", columns, 10)
+
+
 def test_shared_memory_is_there_to_its_last_byte(tmp_path: Path) -> None:
     """In a full /dev/shm, as that of a container soon is, its pages were missing when the loop came to write them."""
     ring = Ring.create(tmp_path / "rds-0.ring", ["a", "b"], 10_000)

@@ -69,11 +69,21 @@ def test_a_staircase_level_by_level() -> None:
         sample_voltage(staircase(4.0, 100.0, 5), 1e-3, 100)
 
 
+@pytest.mark.parametrize("lines, multiples", [("all", [4, 5, 6, 7, 8]), ("odd", [5, 7])])
+def test_a_multisine_begins_and_ends_with_its_band(lines: str, multiples: list[int]) -> None:
+    spectrum = np.abs(np.fft.rfft(multisine(1.0, 1.0, 3.9, 8.0, lines).value(np.arange(100) * 0.01)))
+    assert np.flatnonzero(spectrum > 1e-6).tolist() == multiples
+
+
 def test_what_will_not_do_is_refused() -> None:
     with pytest.raises(InputError, match="exchange them"):
         chirp(1.0, 5.0, 2.0, 1.0)
     with pytest.raises(InputError, match="0 odd multiples"):
         multisine(1.0, 1.0, 2.0, 2.5, "odd")
+    with pytest.raises(InputError, match=r"1000 Hz is more than 1e\+06 times frequency = 1e-12 Hz; give a higher"):
+        multisine(1.0, 1e-12, 1.0, 1e3)  # and the memory of no computer is filled
+    with pytest.raises(InputError, match="half the sampling frequency"):
+        sample_voltage(staircase(1.0, 1.0, 10**10), 1e-3, 10)
     with pytest.raises(InputError, match="lines = 'even'"):
         multisine(1.0, 1.0, 2.0, 20.0, "even")
     with pytest.raises(InputError, match="half the sampling frequency"):

@@ -96,6 +96,17 @@ def test_rows_repeat_with_a_period(tmp_path):
         user(file=write(tmp_path, "0,0\n1,2\n2,0\n"), period=1.0)
 
 
+@pytest.mark.parametrize("samples", [2, 3, 5, 10, 30])
+@pytest.mark.parametrize("interpolation", ["hold", "linear", "spline"])
+def test_a_period_begins_at_its_sample_in_spite_of_rounding(tmp_path, interpolation, samples):
+    period = round(samples * T, 6)
+    file = write(tmp_path, f"0,0\n{0.3 * period},2\n{0.95 * period},5\n")
+    repeated = sample(user(file=file, interpolation=interpolation, period=period), T, 50 * samples)
+    for part in repeated:
+        first = part[:samples]
+        np.testing.assert_allclose(part.reshape(-1, samples), np.tile(first, (50, 1)), atol=1e-6 * np.ptp(first) + 1e-9)
+
+
 def test_rows_with_velocity_and_acceleration_are_kept(tmp_path):
     file = write(tmp_path, "time,position,velocity,acceleration\n" + wave_rows(4, step=0.05))
     built, exact = sample(user(file=file), T, 5000), sample(sinusoid(5, 0.2), T, 5000)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rds.bus.analysis.analysis_report import MET, MISSED, Analysis, Row, time_text
 from rds.bus.analysis.measured_words import BEYOND
 from rds.bus.medium.bits import INTERFRAME
+from rds.core.colours import BLACK, BLUE, GREY, ORANGE, VERMILLION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,9 +16,7 @@ if TYPE_CHECKING:
 
     from rds.bus.analysis.measured import Delays, Measured
 
-# Okabe and Ito, "Color Universal Design" (2008)
-_BLUE, _ORANGE, _VERMILLION, _GREY, _BLACK = "#0072B2", "#E69F00", "#D55E00", "#8A8A8A", "#000000"
-_COLOURS = {MET: _BLUE, MISSED: _ORANGE}
+_COLOURS = {MET: BLUE, MISSED: ORANGE}
 _PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
 _BINS = 200  # of the measured distribution, over the width
 _SEVERAL = 20  # messages beyond which the picture gets no taller
@@ -52,10 +51,10 @@ def _cycle(axes: Axes, analysis: Analysis) -> None:
     space = INTERFRAME * 1e6 / analysis.bitrate
     for slot in analysis.cycle:
         released, start, end = slot.released / 1e3, slot.start / 1e3, slot.end / 1e3
-        axes.barh(slot.message, start - released, left=released, height=0.5, color=_BLUE, alpha=0.2)
-        axes.barh(slot.message, end - space - start, left=start, height=0.5, color=_BLUE)
-        axes.barh(slot.message, space, left=end - space, height=0.5, color=_GREY)
-        axes.plot([released, released], [slot.message - 0.36, slot.message + 0.36], color=_BLACK, linewidth=1.2)
+        axes.barh(slot.message, start - released, left=released, height=0.5, color=BLUE, alpha=0.2)
+        axes.barh(slot.message, end - space - start, left=start, height=0.5, color=BLUE)
+        axes.barh(slot.message, space, left=end - space, height=0.5, color=GREY)
+        axes.plot([released, released], [slot.message - 0.36, slot.message + 0.36], color=BLACK, linewidth=1.2)
         text = f"{analysis.rows[slot.message].bits} bits"
         place = (end, slot.message)
         axes.annotate(
@@ -65,7 +64,7 @@ def _cycle(axes: Axes, analysis: Analysis) -> None:
     shortest = min(row.period for row in analysis.rows) * 1e6
     axes.set_xlim(0, max(last * 1.12, shortest * 1.01 if shortest < 3 * last else 0))
     if shortest < 3 * last:
-        axes.axvline(shortest, color=_BLACK, linewidth=1.2, linestyle=(0, (5, 2)))
+        axes.axvline(shortest, color=BLACK, linewidth=1.2, linestyle=(0, (5, 2)))
         name = f"period {shortest:g} µs "
         axes.annotate(name, (shortest, -0.55), ha="right", va="top", fontsize="small")
     axes.set_xlabel("time since the beginning of the cycle [µs]")
@@ -83,9 +82,9 @@ def _responses(axes: Axes, analysis: Analysis, measured: Measured | None) -> Non
             alpha = 1.0 if measured is None else 0.25
             axes.barh(place, row.response * 1e6, height=0.5, color=_COLOURS[row.verdict], alpha=alpha)
         else:
-            axes.barh(place, edge, height=0.5, color=_VERMILLION, alpha=0.35, hatch="//", edgecolor="white")
+            axes.barh(place, edge, height=0.5, color=VERMILLION, alpha=0.35, hatch="//", edgecolor="white")
         deadline = row.deadline * 1e6
-        axes.plot([deadline, deadline], [place - 0.4, place + 0.4], color=_BLACK, linewidth=1.6)
+        axes.plot([deadline, deadline], [place - 0.4, place + 0.4], color=BLACK, linewidth=1.6)
         if measured is None:
             _say(axes, place, row, edge)
         else:
@@ -105,8 +104,8 @@ def _measured(axes: Axes, place: int, row: Delays, edge: float) -> None:
         return
     counts, edges = np.histogram(row.values * 1e6, bins=np.linspace(0.0, edge, _BINS + 1))
     heights = np.sqrt(counts / max(1, counts.max()))  # rare ones are to be seen
-    colour = _VERMILLION if row.verdict == BEYOND else _BLACK
-    axes.stairs(place + 0.25 - 0.5 * heights, edges, baseline=place + 0.25, fill=True, color=_BLUE, zorder=3)
+    colour = VERMILLION if row.verdict == BEYOND else BLACK
+    axes.stairs(place + 0.25 - 0.5 * heights, edges, baseline=place + 0.25, fill=True, color=BLUE, zorder=3)
     largest = row.largest * 1e6
     axes.plot([largest], [place + 0.34], marker="^", color=colour, markersize=6, zorder=4)
     words = f"{time_text(row.largest)}, {row.verdict}"
@@ -142,7 +141,7 @@ def _say(axes: Axes, place: int, row: Row, edge: float) -> None:
         ha="right" if inside else "left",
         va="center",
         fontsize="small",
-        color="white" if inside and row.verdict == MET else _BLACK,
+        color="white" if inside and row.verdict == MET else BLACK,
         bbox=None if inside else _PAPER,  # over a deadline's mark
     )
 

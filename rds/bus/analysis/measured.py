@@ -250,10 +250,11 @@ class _Log:
     def _time(self, frame: can.Message) -> tuple[float, int]:
         """How long the frame was on the bus, s, and its bits with the interframe space; 0 for those of two rates."""
         data = bytes(frame.data)
-        what = (frame.arbitration_id, frame.is_extended_id, frame.is_remote_frame, frame.is_fd, frame.dlc, data)
+        flags = (frame.is_extended_id, frame.is_remote_frame, frame.is_fd, frame.bitrate_switch)
+        what = (frame.arbitration_id, data, flags, frame.dlc)
         if (found := self._times.get(what)) is None:
             dlc = frame.dlc if frame.is_remote_frame else None
-            bits = frame_bits(*what[:1], data, what[1], what[2], what[3], frame.bitrate_switch, dlc=dlc)
+            bits = frame_bits(frame.arbitration_id, data, *flags, dlc=dlc)
             time = bits.time(self.bitrate, self.data_bitrate) * 1e-9
             found = time, 0 if bits.fast else bits.total + INTERFRAME
             if len(self._times) < 100_000:

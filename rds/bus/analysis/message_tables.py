@@ -95,17 +95,23 @@ def _of_csv(path: Path, period: float | None) -> MessageTable:
         columns = [column.strip().lower() for column in head.rstrip("\r\n").split(separator)]
         _check_columns(columns, path)
         reader = csv.reader(file, delimiter=separator)
-        for row in reader:
-            if not row or row[0].lstrip().startswith("#"):
-                continue
+        try:
+            for row in reader:
+                if not row or row[0].lstrip().startswith("#"):
+                    continue
+                where = f"{path}:{reader.line_num + 1}"
+                if len(row) != len(columns):
+                    raise InputError(f"the line has {len(row)} columns, and the heading {len(columns)}", where)
+                message = _message(dict(zip(columns, map(str.strip, row), strict=True)), period, where)
+                if isinstance(message, str):
+                    silent.append(message)
+                else:
+                    messages.append(message)
+        except csv.Error as error:
             where = f"{path}:{reader.line_num + 1}"
-            if len(row) != len(columns):
-                raise InputError(f"the line has {len(row)} columns, and the heading {len(columns)}", where)
-            message = _message(dict(zip(columns, map(str.strip, row), strict=True)), period, where)
-            if isinstance(message, str):
-                silent.append(message)
-            else:
-                messages.append(message)
+            raise InputError(f"the line cannot be read ({error}); repair it", where) from error
+        except InputError as error:  # of a message that cannot be
+            raise error if error.where else InputError(str(error), where) from error
     return MessageTable(messages, silent)
 
 
@@ -115,9 +121,9 @@ def _check_columns(columns: list[str], path: Path) -> None:
     if missing or unknown:
         what = f"has no column {' and no column '.join(missing)}" if missing else f"has the column {unknown[0]!r}"
         raise InputError(f"the first line {what}; the columns are {', '.join(_COLUMNS)}", f"{path}:1")
-    for column in _OF_TIME:
-        if sum(name.startswith(f"{column}_") for name in columns) > 1:
-            raise InputError(f"{column} is given twice, in different units; leave one out", f"{path}:1")
+    meant = [next((column for column in _OF_TIME if name.startswith(f"{column}_")), name) for name in columns]
+    if twice := next((column for column in meant if meant.count(column) > 1), None):
+        raise InputError(f"{twice} is given twice; leave one out", f"{path}:1")
 
 
 def _message(row: Mapping[str, str], period: float | None, where: str) -> Message | str:

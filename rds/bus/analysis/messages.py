@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from rds.bus.medium.bits import Bits, frame_bits, least_bits, most_bits
+from rds.bus.medium import station
+from rds.bus.medium.bits import Bits, frame_bits, header, least_bits, most_bits
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.frames import Answer, Kind, Status
 from rds.core.errors import InputError
@@ -42,8 +43,8 @@ class Message:
     after: str | None = None
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.period < 1e6:
-            raise self._wrong(f"period {self.period!r} s must be more than 0 and less than 1e6")
+        if not 1e-9 <= self.period < 1e6:
+            raise self._wrong(f"period {self.period!r} s must be at least 1e-9 and less than 1e6")
         if not 0.0 <= self.jitter < 1e6:
             raise self._wrong(f"jitter {self.jitter!r} s must be from 0 to less than 1e6")
         if self.deadline is not None and not 0.0 < self.deadline < 1e6:
@@ -51,7 +52,8 @@ class Message:
         if self.data is not None and (len(self.data) != self.size or self.remote):
             raise self._wrong(f"data of {len(self.data)} bytes contradict {'remote' if self.remote else self.size}")
         try:
-            self._with(bytes(0 if self.remote else self.size))
+            size, dlc = (0, self.size) if self.remote else (self.size, None)
+            header(self.identifier, size, self.extended, self.remote, self.fd, self.bitrate_switch, dlc=dlc)
         except InputError as error:
             raise self._wrong(str(error)) from None
 
@@ -80,15 +82,8 @@ class Message:
 
 
 def priority(message: Message) -> int:
-    """What the message shows during arbitration, as a number: the lower wins.
-
-    The 11 leading bits first, then RTR or SRR and IDE: a data frame goes before a remote frame of its identifier, and
-    both before an extended frame that begins with the same 11 bits, whose SRR and IDE are recessive.
-    """
-    identifier, remote = message.identifier, int(message.remote)
-    if not message.extended:
-        return identifier << 21 | remote << 20
-    return identifier >> 18 << 21 | 3 << 19 | (identifier & 0x3FFFF) << 1 | remote
+    """What the message shows during arbitration, as a number: the lower wins."""
+    return station.priority(message.identifier, message.extended, message.remote)
 
 
 def in_order(messages: Iterable[Message]) -> list[Message]:

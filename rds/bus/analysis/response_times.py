@@ -53,12 +53,15 @@ class Errors:
     interval: float = inf
 
     def __post_init__(self) -> None:
-        if self.burst < 1 or not self.interval > 0.0:
-            raise InputError(f"{self.burst!r} errors every {self.interval!r} s; burst is 1 or more, interval above 0")
+        if self.burst % 1 or self.burst < 1 or not self.interval >= 1e-9:
+            raise InputError(
+                f"{self.burst!r} errors every {self.interval!r} s; burst is a whole number of 1 or more, and the "
+                "interval at least 1e-9 s"
+            )
 
     def within(self, time: int) -> int:
         """How many errors `time` ns can see."""
-        return self.burst + (
+        return int(self.burst) + (
             _ceil(time, _ns(self.interval, down=True)) - 1 if isfinite(self.interval) and time > 0 else 0
         )
 

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import socket
 from struct import Struct
 
 from rds.bus.hub.runtime_folder import runtime_directory
+from rds.core.channel_name import CHANNEL
 from rds.core.private_files import write_private
 
-_CHANNEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,31}", re.ASCII)
 _SUFFIXES = (".sock", ".tcp")
 _CREDENTIALS = Struct("3i")  # process, user, group
 
@@ -29,7 +28,7 @@ class Address:
     """
 
     def __init__(self, channel: str):
-        if not _CHANNEL.fullmatch(channel):
+        if not CHANNEL.fullmatch(channel):
             raise ValueError(
                 f"channel {channel!r} must be 1 to 32 letters, digits, '.', '_' or '-', the first a letter or digit"
             )

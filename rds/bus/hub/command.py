@@ -12,6 +12,7 @@ from rds.bus.hub.runtime_folder import runtime_directory
 from rds.core.errors import MachineError
 
 _LONGEST = 400  # bytes of a holder's name
+_LOOKS = 0.2  # s in which one who only looks whether somebody commands (`commanded`) has given it back
 _YOUNG = 60.0  # s: a file may just have been made, and its lock not yet taken
 
 
@@ -56,10 +57,13 @@ class Command:
             self._descriptor = None
 
     def __enter__(self) -> Command:
-        if not self.acquire():
-            raise MachineError(
-                f"another run commands the machine on channel {self.channel!r}: {self.holder()}; wait, or stop it"
-            )
+        end = time.monotonic() + _LOOKS
+        while not self.acquire():
+            if time.monotonic() > end:
+                raise MachineError(
+                    f"another run commands the machine on channel {self.channel!r}: {self.holder()}; wait, or stop it"
+                )
+            time.sleep(_LOOKS / 100.0)
         return self
 
     def __exit__(self, *_: object) -> None:

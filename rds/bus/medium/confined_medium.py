@@ -89,9 +89,9 @@ class ConfinedMedium(Medium[Node]):
     def _land_whole(self, flight: Flight[Node], both: Sequence[Node], time: int) -> None:
         senders, fault = flight.senders, flight.fault
         self.frames += 1
-        deaf = [*self._deaf(), *both[1:]] if self._ill or len(both) > 1 else []
+        deaf = {*self._deaf(), *both[1:]} if self._ill or len(both) > 1 else set()
         if fault is not None and fault.kind == "lose":
-            deaf += [node for node, its in self.stations.items() if fault.receiver in (None, its.name)]
+            deaf |= {node for node, its in self.stations.items() if fault.receiver in (None, its.name)}
         for node in deaf:
             self.stations[node].lost += node not in both
         self._done.append(Delivery(senders[0], flight.frames[0].record, flight.end, deaf))

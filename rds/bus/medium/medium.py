@@ -162,9 +162,15 @@ class UntimedMedium(Medium[Node]):
         if station is not None:
             delay = self.frame_faults.delay(station.name, frame, now)
             if delay:
-                self.at(now + delay, lambda time: self._send(node, station, frame, time))
+                self.at(now + delay, lambda time: self._send_late(node, frame, time))
                 return
         self._send(node, station, frame, now)
+
+    def _send_late(self, node: Node, frame: bytes, now: int) -> None:
+        """A frame that has waited in its sender, unless that has died or gone meanwhile."""
+        station = self.stations.get(node)
+        if station is not None and not station.dead:
+            self._send(node, station, frame, now)
 
     def _send(self, node: Node, station: Station | None, frame: bytes, now: int) -> None:
         if station is None:
@@ -177,7 +183,7 @@ class UntimedMedium(Medium[Node]):
         deaf = self._deaf()
         if strike is not None and strike.kind == "lose":
             missed = [other for other, its in self.stations.items() if strike.receiver in (None, its.name)]
-            deaf = (*deaf, *missed)
+            deaf = tuple({*deaf, *missed})
         for other in deaf:
             self.stations[other].lost += other is not node
         self._waiting.append(Delivery(node, frame, 0, deaf))

@@ -98,8 +98,9 @@ class Station:
 def priority(identifier: int, extended: bool, remote: bool) -> int:
     """What a frame shows during arbitration, as a number: the lower wins.
 
-    The 11 leading bits, then RTR or SRR, IDE, and an extended frame's other 18 bits and RTR (ISO 11898-1, 10.4.2;
-    see messages.priority, which says the same of a message).
+    The 11 leading bits, then RTR or SRR, IDE, and an extended frame's other 18 bits and RTR (ISO 11898-1, 10.4.2): a
+    data frame goes before a remote frame of its identifier, and both before an extended frame that begins with the same
+    11 bits, whose SRR and IDE are recessive.
     """
     if not extended:
         return identifier << 21 | remote << 20

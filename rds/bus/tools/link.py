@@ -35,10 +35,10 @@ def bus_options(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def default_channel(machine: Machine, interface: str, channel: str | None) -> str | None:
-    """The channel that was asked for, else the machine's name on the built-in bus and a serial line, else none: the
+    """The channel that was asked for, else that of the machine on the built-in bus and a serial line, else none: the
     interface has a default of its own.
     """
-    return channel if channel is not None or interface not in (BUILTIN, SERIAL) else machine.name
+    return channel if channel is not None or interface not in (BUILTIN, SERIAL) else machine.channel
 
 
 def open_bus(

@@ -18,6 +18,9 @@ from typing import Any
 
 from rds.core.quantities import Quantity, Table
 from rds.core.types import Controller, Reference
+from rds.machines import Axis
+from rds.modes.loop.commands import Command
+from rds.modes.loop.laws import broken, told_values
 
 NAME = "compensation"
 COMPENSATION = Table(
@@ -36,33 +39,38 @@ class _Compensated:
     inner: Controller
     gain: float  # of a sample
     most: float
-    names: tuple[str, ...]
+    axis: str
+    command: tuple[str, str]  # what `inner` hands out, and its unit
 
     def control(self, t: float, r: Reference, y: float, state: Any, params: Any) -> Any:
+        inner, names = self.inner, tuple(self.inner.signals)
         own, c = state
-        moved = Reference(r.position + c, r.velocity, r.acceleration)
-        answer = self.inner.control(t, moved, y, own, params)
-        tells = bool(self.names) and self.inner.observe is None
+        answer = inner.control(t, Reference(r.position + c, r.velocity, r.acceleration), y, own, params)
+        tells = bool(names) and inner.observe is None
         if not isinstance(answer, tuple | list) or len(answer) != 2 + tells:
-            return answer  # the loop says what is wrong with it
+            raise broken(answer, t, self.axis, inner, self.command)
         after = min(max(c + self.gain * (r.position - y), -self.most), self.most)
-        if self.inner.observe is not None:
+        if inner.observe is not None:
             return answer[0], (answer[1], after)
-        return answer[0], (answer[1], after), {**(answer[2] if tells else {}), NAME: c}
+        values = told_values(answer[2], names, t, self.axis, inner) if tells else ()
+        return answer[0], (answer[1], after), {**dict(zip(names, values, strict=True)), NAME: c}
 
     def observe(self, y: float, state: Any, following: Any, params: Any) -> Sequence[float]:
         assert self.inner.observe is not None
         return [*self.inner.observe(y, state[0], following[0], params), state[1]]
 
 
-def compensated(controller: Controller, T: float, time: float, most: float, unit: str) -> Controller:
-    """The controller of one axis with error compensation: time constant in s, largest compensation in the unit."""
-    law = _Compensated(controller, T / time, most, tuple(controller.signals))
+def compensated(controller: Controller, T: float, time: float, most: float, axis: Axis, command: Command) -> Controller:
+    """The controller of an axis with error compensation: time constant in s, largest compensation in the axis's unit.
+
+    `command` is what the controller hands out.
+    """
+    law = _Compensated(controller, T / time, most, axis.name, (command.quantity, command.unit(axis.unit)))
     return replace(
         controller,
         control=law.control,
         initial_state=(controller.initial_state, 0.0),
         source=replace(controller.source, name=f"{controller.source.name} with error compensation"),
-        signals={**controller.signals, NAME: unit},
+        signals={**controller.signals, NAME: axis.unit},
         observe=None if controller.observe is None else law.observe,
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -52,8 +53,11 @@ def obstacle(plan: Plan) -> str | None:
     return None
 
 
-def run_compiled(plan: Plan) -> Rows:
-    """What the loop would have recorded of a simulation, to the last bit. See `obstacle` for what can be compiled."""
+def run_compiled(plan: Plan) -> Rows | None:
+    """What the loop would have recorded of a simulation, to the last bit. See `obstacle` for what can be compiled.
+
+    None where a position or a voltage grows beyond all numbers: the loop says which, and when.
+    """
     columns, units = plan.columns(None, simulates_plant=True)
     rows = np.empty((plan.samples, len(columns)))
     rows[:, 0] = np.arange(plan.samples)
@@ -62,14 +66,15 @@ def run_compiled(plan: Plan) -> Rows:
     for axis in plan.axes:
         name = axis.axis.name
         resolution = axis.axis.resolution if plan.quantization else 0.0
+        far = resolution * 2.0**62 if resolution else inf  # to where positions can be counted
         start = tuple(float(value) for value in axis.model.initial_state)
         voltage = rows[:, columns.index(f"{name}_voltage")]
         first = columns.index(f"{name}_reference" if axis.controller else f"{name}_measured")
         table = rows[:, first : columns.index(f"{name}_command") + 1 + len(axis.signals)]
-        interface = (*output, resolution)
+        interface = (*output, resolution, far)
         constants = coefficients(axis.model.params, plan.T)
         if axis.controller is None:
-            playing()(np.asarray(axis.signal, dtype=float), constants, start, interface, table, voltage)
+            taken = playing()(np.asarray(axis.signal, dtype=float), constants, start, interface, table, voltage)
         else:
             reference, law = axis.reference, pure_law(axis)
             assert reference is not None and law is not None
@@ -77,7 +82,7 @@ def run_compiled(plan: Plan) -> Rows:
             tracking = controlled(law, pure_law(axis, "known") if axis.signals else None)
             plant = f"{name}_plant_velocity"
             velocity = rows[:, columns.index(plant)] if plant in columns else np.empty(plan.samples)
-            tracking(
+            taken = tracking(
                 *(np.asarray(part, dtype=float) for part in parts),
                 tuple(axis.controller.params["coefficients"]),
                 tuple(float(value) for value in axis.controller.initial_state),
@@ -88,13 +93,16 @@ def run_compiled(plan: Plan) -> Rows:
                 voltage,
                 velocity,
             )
+        if taken < plan.samples:
+            return None
     return Rows(columns, units, rows, Ending.DONE, "", {})
 
 
 @lru_cache
-def controlled(law: Callable[..., Any], known: Callable[..., Any] | None) -> Callable[..., None]:
+def controlled(law: Callable[..., Any], known: Callable[..., Any] | None) -> Callable[..., int]:
     """The compiled loop of one axis under `law`, filling its columns from the reference to the signals, and others.
 
+    It returns how many samples it took: all, unless a position or a voltage grew beyond all numbers.
     The signals are those that `known` gives of a law that has them; the others are voltage and the plant's velocity.
     """
     from numba import njit
@@ -107,10 +115,14 @@ def controlled(law: Callable[..., Any], known: Callable[..., Any] | None) -> Cal
     def simulate(p, v, a, coefficients, state, constants, start, interface, table, voltage, velocity):  # type: ignore[no-untyped-def]
         x, w = start
         T, decay, reach, tau, K, plus, minus = constants
-        low, high, step, resolution = interface
+        low, high, step, resolution, far = interface
         for k in range(len(p)):
+            if not abs(x) < far:
+                return k
             y = counted(x, resolution)
             u, following = law(p[k], v[k], a[k], y, state, coefficients)
+            if not abs(u) < inf:
+                return k
             tell(table, k, y, state, following, coefficients)
             state = following
             velocity[k] = w
@@ -122,8 +134,9 @@ def controlled(law: Callable[..., Any], known: Callable[..., Any] | None) -> Cal
             u = converted(u, low, high, step)
             voltage[k] = u
             x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)
+        return len(p)
 
-    compiled: Callable[..., None] = simulate
+    compiled: Callable[..., int] = simulate
     return compiled
 
 
@@ -152,8 +165,8 @@ def _telling(known: Callable[..., Any] | None) -> Callable[..., None]:
 
 
 @lru_cache
-def playing() -> Callable[..., None]:
-    """The compiled loop of one axis under a voltage signal, filling its columns measured and command, and voltage."""
+def playing() -> Callable[..., int]:
+    """The same under a voltage signal, filling the columns measured and command, and voltage."""
     from numba import njit
 
     move = njit(respond)
@@ -163,15 +176,18 @@ def playing() -> Callable[..., None]:
     def simulate(command, constants, start, interface, table, voltage):  # type: ignore[no-untyped-def]
         x, w = start
         T, decay, reach, tau, K, plus, minus = constants
-        low, high, step, resolution = interface
+        low, high, step, resolution, far = interface
         for k in range(len(command)):
+            if not abs(x) < far:
+                return k
             table[k, 0] = counted(x, resolution)
             table[k, 1] = command[k]
             u = converted(command[k], low, high, step)
             voltage[k] = u
             x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)
+        return len(command)
 
-    compiled: Callable[..., None] = simulate
+    compiled: Callable[..., int] = simulate
     return compiled
 
 

@@ -160,11 +160,13 @@ class Experiment:
 
         InputError for an experiment of several axes, each of which has a model of its own.
         """
-        table = {key: value for key, value in self._words.table.items() if key != "model"}
-        if len(self.plan().axes) > 1 or isinstance(table.get("axis"), dict):
+        if len(self.plan().axes) > 1:
             raise InputError("it has several axes, each with a model of its own; name these in the experiment's file")
+        table = self._words.table | {"model": model}
+        if isinstance(own := table.get("axis"), dict):
+            table["axis"] = {name: {key: each[key] for key in each if key != "model"} for name, each in own.items()}
         changed = copy.copy(self)
-        changed._words = self._words.over_written(table | {"model": model})
+        changed._words = self._words.over_written(table)
         changed.plan()
         return changed
 
@@ -229,6 +231,11 @@ class Experiment:
     def _prepared(self, mode: str | None, out: str | Path | None, changes: Iterable[Any]) -> Run:
         plan, known = self._resolve(mode)
         plan = plan.with_changes(changes)
+        if plan.program is None and plan.changes and (late := plan.changes[-1])[0] >= plan.samples:
+            raise InputError(
+                f"the change of {late[1]} at {late[0] * plan.T:g} s comes after the run, which lasts "
+                f"{plan.samples * plan.T:g} s; make it earlier, or the run longer"
+            )
         if out is not None:
             require_writable(out)
             folder: Path | None = Path(out)
@@ -298,9 +305,10 @@ class Experiment:
             from rds.modes.experiment.compiled import obstacle, run_compiled
 
             note = obstacle(plan) or (None if live is None else "somebody may change it while it runs")
-            if note is None:
-                return run_compiled(plan)
-            note = f"not compiled: {note}"
+            if note is not None:
+                note = f"not compiled: {note}"
+            elif (compiled := run_compiled(plan)) is not None:
+                return compiled
         rows = run_plan(plan, folder, progress, live)
         return replace(rows, notes=(note,)) if note else rows
 

@@ -38,19 +38,22 @@ Trial = Callable[[int, Result], object]  # hears of a trial that has ended: its 
 class Learned:
     """What `learn` leaves: the result of each trial, and what the laws got besides their references in the last one.
 
-    `correction` has an array in mm for each axis, a value per sample.
+    `correction` has an array in the axis's unit for each axis, a value per sample.
     """
 
     results: tuple[Result, ...]
     correction: dict[str, np.ndarray]
 
     def __repr__(self) -> str:
-        errors = ", ".join(f"{axis} from {rms[0]:.3g} to {rms[-1]:.3g}" for axis, rms in self.rms.items())
-        return f"<Learned in {len(self.results)} trials: RMS of the tracking error of {errors} mm>"
+        units = self.results[0].units
+        errors = ", ".join(
+            f"{axis} from {rms[0]:.3g} to {rms[-1]:.3g} {units[f'{axis}_measured']}" for axis, rms in self.rms.items()
+        )
+        return f"<Learned in {len(self.results)} trials: RMS of the tracking error of {errors}>"
 
     @property
     def rms(self) -> dict[str, list[float]]:
-        """RMS of each axis's tracking error by trial, mm."""
+        """RMS of each axis's tracking error by trial, in its unit."""
         axes = self.results[0].meta["axes"]
         return {axis: [_rms(result, axis) for result in self.results] for axis in axes}
 
@@ -92,6 +95,7 @@ def learn(
         raise InputError(f"cutoff = {cutoff:g} Hz must be below half of the sample rate, {0.5 / plan.T:g} Hz")
     corrections = {name: np.zeros(plan.samples) for name in plan.names}
     results: list[Result] = []
+    trials = int(trials)  # 3.0 is a whole number, too
     for number in range(1, trials + 1):
         result = _Corrected(experiment, corrections).run(mode)
         results.append(result)
@@ -165,7 +169,7 @@ class _Corrected(Experiment):
 
 
 def _corrected(controller: Controller, correction: np.ndarray, T: float) -> Controller:
-    """The law with `correction` (mm at every sample) added to its reference."""
+    """The law with `correction` (axis unit, at every sample) added to its reference."""
     velocity = np.gradient(correction, T)
     rows = list(zip(correction.tolist(), velocity.tolist(), np.gradient(velocity, T).tolist(), strict=True))
     return replace(

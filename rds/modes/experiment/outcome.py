@@ -22,7 +22,7 @@ from rds.modes import SIMULATION, load_mode
 from rds.modes.loop.plan import Plan
 from rds.modes.loop.stopwatch import TIMING_COLUMNS
 from rds.modes.process.environment import sentence
-from rds.modes.process.host import Rows, run_plan
+from rds.modes.process.host import FailedSimulation, Rows, run_plan
 from rds.modes.process.record import table
 from rds.modes.process.replay import as_recorded
 from rds.modes.process.second_look import own_times
@@ -40,9 +40,12 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
         for told in (columns, units):
             told.pop("interpolate", None)  # nothing was interpolated
     sample = rows.values[:, 0].astype(np.int64)
-    if mode.followed and plan.controlled and plan.repeatable:
-        columns |= _simulated(plan, rows, sample)
     meta = _description(plan, rows) | known
+    if mode.followed and plan.controlled and plan.repeatable:
+        try:
+            columns |= _simulated(plan, rows, sample)
+        except FailedSimulation as error:  # what the machine did is kept
+            meta["notes"].append(f"the same run simulated has no response to compare with: {error}")
     meta["notes"] += _of_another_period(plan) + _beyond_travel(plan, columns) + _concluded(plan, columns)
     if mode.real_time:
         meta |= _judged(plan, rows, sample)

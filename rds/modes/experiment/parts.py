@@ -60,9 +60,11 @@ def make_model(words: TomlTable, setting: Setting) -> Model:
     table, student = _table_or_student(words, "model", setting)
     if student is not None:
         substeps = table.read("substeps")
+        if "substeps" in table and "advance" in student.functions:
+            raise table.fault("substeps", "is for derivatives(), and advance() takes a sample in one step; remove it")
         params = _params(table)
         table.done()
-        with named(table):
+        with named(table), limited():  # it may be called once
             return student_model(student, params, substeps)
     if "file" in table:
         return _fitted_model(table, setting)

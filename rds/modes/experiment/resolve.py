@@ -266,7 +266,7 @@ def _axis_plan(
 
 
 def _compensated(table: TomlTable, setting: Setting, controller: Controller | None) -> Controller | None:
-    """The controller with error compensation; that of a spindle as it is, unless it is meant itself."""
+    """The controller with error compensation; that of a spindle as it is."""
     axis = setting.axis
     time, most = table.read("time"), table.read("most")
     table.done()
@@ -278,12 +278,13 @@ def _compensated(table: TomlTable, setting: Setting, controller: Controller | No
             table.place(),
         )
     if setting.command is Command.PROFILE or axis.is_spindle:
+        _refuse_own(table, axis, "is for position axes, but not for drives with a profile of their own")
         return controller
     if controller.source.name == "relay":
         raise InputError(
             "[error_compensation] moves the reference, about which the law relay swings; leave it out", table.place()
         )
-    return compensated(controller, setting.T, time, most, axis.unit)
+    return compensated(controller, setting.T, time, most, axis, setting.command)
 
 
 def _following_error(words: TomlTable, setting: Setting, driven: str) -> Allowed | None:
@@ -298,9 +299,16 @@ def _following_error(words: TomlTable, setting: Setting, driven: str) -> Allowed
     if driven == "signal":
         raise InputError("[signal] drives the axis without a reference: remove [following_error]", table.place())
     if setting.axis.is_spindle:
+        _refuse_own(table, setting.axis, "is for position axes")
         return None
     limits = setting.axis.limits
     return Allowed(at_rest, ferror, setting.top_speed if limits is None else limits.velocity)
+
+
+def _refuse_own(table: TomlTable, axis: Axis, why: str) -> None:
+    """InputError for a table of this axis alone, which would change nothing; a general one is for the other axes."""
+    if table.name.startswith(f"axis.{axis.name}."):
+        raise InputError(f"[{table.name}] {why}: remove it", table.place())
 
 
 def _program(words: TomlTable, mode: Mode) -> str:
@@ -369,7 +377,7 @@ def _timing(words: TomlTable, mode: Mode) -> dict[str, Any]:
     }
     table.done()
     if settings["cpu"] is not None:
-        if not hasattr(os, "sched_setaffinity"):
+        if not hasattr(os, "sched_getaffinity"):
             raise table.fault("cpu", "cannot be chosen on this system, only on Linux; remove it")
         if settings["cpu"] not in (usable := sorted(os.sched_getaffinity(0))):
             raise table.fault("cpu", f"is not a processor that this program may use; it may use {usable}")

@@ -5,18 +5,21 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from math import ceil, isfinite
+from math import ceil
 from pathlib import Path
 from time import sleep
 from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
+from rds.core.quantities import Quantity
+from rds.core.shared_quantities import DURATION
 from rds.core.types import Ending
 from rds.modes.loop.live_values import Channel, LiveValues, Note, find
 
 FILE = "changes.csv"
 STOP = "stop"
 _LOOK = 0.005  # s between two looks at the live values while time stands still
+_TIME = Quantity("", "s", 0.0, DURATION.high)
 _HEADINGS = ("time [s]", "name", "old", "new")
 
 
@@ -126,8 +129,8 @@ def plan_changes(
         if not isinstance(entry, Sequence) or isinstance(entry, str) or len(entry) not in (3, 4):
             raise InputError(f'change {entry!r:.100} must be (time in s, name, value), as in (1.5, "X.Pgain", 20.0)')
         time, name, value = entry[0], entry[1], entry[-1]
-        if isinstance(time, bool) or not isinstance(time, int | float) or not isfinite(time) or time < 0.0:
-            raise InputError(f"change {entry!r:.100}: its time must be a number of at least 0 s")
+        if (fault := _TIME.fault(time)) is not None:
+            raise InputError(f"change {entry!r:.100}: its time {fault}")
         if not isinstance(name, str):
             raise InputError(f"change {entry!r:.100}: its second part must be the name of a live value")
         planned.append((_sample(float(time), T), name, find(channels, name).check(value)))

@@ -158,7 +158,11 @@ class Execution:
 
     def waits(self) -> bool:
         """Whether nothing will happen until an operator does something."""
-        if self._values[STOP] or self._values[HOME] or self.ending is not None:
+        if self._values[STOP] or self.ending is not None:
+            return False
+        if self.state is State.HOME:
+            return bool(self._values[HOLD]) and self._way is not None and self._way.rate == 0.0
+        if self._values[HOME]:
             return False
         if self.state in (State.STOP, State.TOOL):  # one sample of it is taken first, for others to see
             return self._shown is self.state and self._values[RESUME] == self._resumed

@@ -96,7 +96,7 @@ def controlled(
                 u = as_voltage(u)
             voltages.append(limit(u))
         except (TypeError, ValueError, OverflowError, ContractError):
-            raise _broken(answer, k * T, name, controller, command) from None
+            raise broken(answer, k * T, name, controller, command) from None
         row += r
         row += (y, u)
 
@@ -134,14 +134,14 @@ def _telling(
                 u = as_voltage(u)
             voltages.append(limit(u))
         except (TypeError, ValueError, OverflowError, ContractError):
-            raise _broken(answer, k * T, name, controller, command) from None
+            raise broken(answer, k * T, name, controller, command) from None
         if observe is None:
-            values: Sequence[float] = _told(told, names, k * T, name, controller)
+            values: Sequence[float] = told_values(told, names, k * T, name, controller)
         else:
             values = observe(y, state, following, params)
             for value in values:
                 if not isfinite(value):
-                    _told(dict(zip(names, values, strict=True)), names, k * T, name, controller)
+                    told_values(dict(zip(names, values, strict=True)), names, k * T, name, controller)
         state = following
         row += r
         row += (y, u, *values)
@@ -179,8 +179,8 @@ def coupled(
             commands = _commands(u, n)
             voltages += [limit(value) for limit, value in zip(limits, commands, strict=True)]
         except (TypeError, ValueError, OverflowError, ContractError):
-            raise _broken(answer, k * T, owners, controller, command, n) from None
-        told = _told(rest[0], signals, k * T, owners, controller, n) if signals else ()
+            raise broken(answer, k * T, owners, controller, command, n) from None
+        told = told_values(rest[0], signals, k * T, owners, controller, n) if signals else ()
         for i in range(n):
             row += (*(of_axes[i] for of_axes in values), float(y[i]), commands[i], *(value[i] for value in told))
 
@@ -219,7 +219,7 @@ def _commands(u: Any, n: int) -> list[float]:
     return values
 
 
-def _told(told: Any, names: Sequence[str], t: float, axis: str, controller: Controller, n: int = 0) -> list[Any]:
+def told_values(told: Any, names: Sequence[str], t: float, axis: str, controller: Controller, n: int = 0) -> list[Any]:
     """The values of the signals, in order; for a coupled law of `n` axes a list of each."""
     try:
         return signal_values(told, names, n)
@@ -228,7 +228,7 @@ def _told(told: Any, names: Sequence[str], t: float, axis: str, controller: Cont
         raise BrokenContract(f"{said}; {signals_wanted(names, n)}", _line(controller)) from None
 
 
-def _broken(
+def broken(
     answer: Any, t: float, axis: str, controller: Controller, command: tuple[str, str], n: int = 1
 ) -> BrokenContract:
     """The error of a command that is none, or of an answer that has too few or too many parts."""

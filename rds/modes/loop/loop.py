@@ -56,7 +56,7 @@ class Loop:
                     for _ in range(k, min(due, samples)):
                         follow(())  # the models live through the discarded periods
                     if due >= samples:
-                        return Ending.DONE
+                        return self._done()
                     k = due
                 if changes is not None:
                     ending = changes(k)
@@ -77,6 +77,10 @@ class Loop:
                     return ending
             if k < samples:
                 return None
-            return (changes.at_end() if changes is not None else None) or Ending.DONE
+            return self._done()
         finally:
             self.k = k
+
+    def _done(self) -> Ending:
+        """How a run ends that has no sample left to take: what drives the axes may have ended it in the last one."""
+        return (self.changes.at_end() if self.changes is not None else None) or Ending.DONE

@@ -58,7 +58,7 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
         return
     check_load(plan, bus, bus.get("bitrate"))
     if given is None:
-        channel = f"{plan.machine.name[:20]}-{secrets.token_hex(4)}"
+        channel = f"{plan.machine.channel[:20]}-{secrets.token_hex(4)}"
     remove_left()
     timing = {key: bus[key] for key in TIMING if key in bus}
     server = start_server(dialect, plan.machine.path, channel, timing)
@@ -115,7 +115,7 @@ def _line_behind(plan: Plan, bus: dict[str, Any]) -> Iterator[dict[str, Any]]:
     from rds.bus.modules.server_process import end_server, start_server
 
     dialect, given = bus["dialect"], bus.get("channel")
-    channel = str(plan.machine.name if given is None else given)
+    channel = str(plan.machine.channel if given is None else given)
     own = {key: bus[key] for key in OF_OWN_LINE if key in bus}
     settled = {key: value for key, value in bus.items() if key not in own} | {"interface": SERIAL, "channel": channel}
     baud = {"baud": bus["baud"]} if "baud" in bus else {}
@@ -134,7 +134,7 @@ def _line_behind(plan: Plan, bus: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield settled
         return
     if given is None:
-        channel = f"{plan.machine.name[:20]}-{secrets.token_hex(4)}"
+        channel = f"{plan.machine.channel[:20]}-{secrets.token_hex(4)}"
     if isinstance(own.get("drift"), dict):
         own["drift"] = ",".join(f"{name}:{value}" for name, value in own["drift"].items())
     server = start_server(dialect, plan.machine.path, channel, own | baud)

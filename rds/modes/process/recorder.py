@@ -197,6 +197,9 @@ def main(arguments: list[str]) -> int:
     """Start the target, record it, conclude."""
     directory, ring = Path(arguments[0]), Ring.open(arguments[1])
     adopt_orphans()
+    for left in (REPORT, TRACE):  # of a run whose recorder and host were killed
+        with contextlib.suppress(OSError):
+            (directory / left).unlink()
     recorder = Recorder(directory, ring)
     with open_private(directory / LOG, "wb") as output:
         target = subprocess.Popen(

@@ -40,7 +40,10 @@ class Ring:
         description = {"columns": columns, "capacity": capacity, **about}
         text = json.dumps(description).encode()
         if len(text) > _HEADER - _TEXT:
-            raise InputError(f"the run's description takes {len(text)} bytes; at most {_HEADER - _TEXT} fit")
+            raise InputError(
+                f"the run's {len(columns)} columns take {len(text)} bytes to describe, of {_HEADER - _TEXT} there are; "
+                "let controllers declare fewer signals, or give these shorter names"
+            )
         size = _HEADER + capacity * 8 * len(columns)
         make(path, size)
         memory, file = _map(path)

@@ -162,7 +162,7 @@ def _bus(
 
     trace = None
     if channel is None and interface == BUILTIN:
-        channel = f"{machine.name[:20]}-{secrets.token_hex(4)}"
+        channel = f"{machine.channel[:20]}-{secrets.token_hex(4)}"
         trace = stack.enter_context(gauges_file())
         said = ",".join(f"{name}:{ppm:g}" for name, ppm in drifts(drift or {}, machine).items())
         words = {"bitrate": bitrate, "trace": str(trace)} | ({"drift": said} if said else {})

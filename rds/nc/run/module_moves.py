@@ -306,7 +306,7 @@ def _bus(machine: Machine, channel: str | None, interface: str, bitrate: int, st
     from rds.bus.modules.server_process import end_server, start_server
 
     if _starts_modules(channel, interface):
-        channel = f"{machine.name[:20]}-{secrets.token_hex(4)}"
+        channel = f"{machine.channel[:20]}-{secrets.token_hex(4)}"
         stack.callback(end_server, start_server("oacs", machine.path, channel))
     if interface == BUILTIN:
         stack.enter_context(Command(str(channel)))

@@ -187,7 +187,7 @@ def _line(
         if line:
             raise InputError(f"{', '.join(line)} is for a line that the run starts itself; {channel} is there already")
         return channel, None
-    where = channel if channel is not None else f"{machine.name[:20]}-{secrets.token_hex(4)}"
+    where = channel if channel is not None else f"{machine.channel[:20]}-{secrets.token_hex(4)}"
     trace = stack.enter_context(gauges_file())
     server = start_server("dcs", machine.path, where, {**line, "baud": baud, "trace": str(trace)})
     stack.callback(end_server, server)

@@ -131,7 +131,7 @@ class Jog:
                 read_settings(bus.get("cia402", {}), self.machine)  # refused here, before anything is started
             interface = bus["interface"] = bus_interface(self.machine, bus)
             if interface in (BUILTIN, SERIAL):
-                bus["channel"] = bus.get("channel") or self.machine.name
+                bus["channel"] = bus.get("channel") or self.machine.channel
             task.note = "looking for the machine"
             self.dialect = self._dialect(bus)
             task.advance(1, 3, "starting the loop")

@@ -111,15 +111,15 @@ def _served(machine: Machine, order: Order) -> str | None:
     if not load_mode(order.mode).real_time:
         return None
     if nodes_of(machine).whole:  # on a serial line
-        return machine.name if os.name == "posix" and is_there(machine.name) else None
-    if machine.name not in channels():
+        return machine.channel if os.name == "posix" and is_there(machine.channel) else None
+    if machine.channel not in channels():
         return None
-    found = find_dialect(machine, BUILTIN, machine.name, DEFAULT)
+    found = find_dialect(machine, BUILTIN, machine.channel, DEFAULT)
     wanted = "oacs" if MOVES in order.methods else DEFAULT
     if found not in (None, wanted):
         raise InputError(
-            f"the modules that are served on {machine.name} speak {found}, and method {', '.join(order.methods)} "
+            f"the modules that are served on {machine.channel} speak {found}, and method {', '.join(order.methods)} "
             f"needs {wanted}: serve them by rds machine serve --dialect {wanted}, or end that server for a run with "
             "modules of its own"
         )
-    return None if found is None else machine.name
+    return None if found is None else machine.channel

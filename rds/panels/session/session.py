@@ -267,7 +267,7 @@ class Session:
             machine = load_machine(self.machine)
             dialect = self.bus.get("dialect", SERIAL_DIALECTS[0])
             if dialect in SERIAL_DIALECTS and bus_interface(machine, self.bus) == SERIAL:
-                return str(self.bus.get("channel") or machine.name)
+                return str(self.bus.get("channel") or machine.channel)
         return None
 
     def _stop_units(self, line: str) -> list[int]:

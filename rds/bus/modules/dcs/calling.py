@@ -17,7 +17,7 @@ def find_units(machine: Machine, channel: str | None, baud: float | None = None,
 
     MachineError if the line is there and can't be opened: another host commands it, or rights are missing.
     """
-    where = machine.name if channel is None else channel
+    where = machine.channel if channel is None else channel
     if not is_there(where):
         return []
     rate = DEFAULT_BAUD if baud is None else baud

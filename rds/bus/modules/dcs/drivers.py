@@ -99,7 +99,7 @@ class DcsDrivers(drivers_base.DriversBase[_Unit, Answer]):
         baud = BAUD.check(DEFAULT_BAUD if baud is None else baud, "baud")
         self._check_time(baud, period, len(names), checksum)
         self._owns_port = port is None
-        where = channel if channel is not None else machine.name
+        where = channel if channel is not None else machine.channel
         super().__init__([_Unit(axis) for axis in used], period, timeout, _lost_after(period), f"{SERIAL}:{where}")
         self._port: Port = SerialPort(where, baud) if port is None else port
         self._receive = self._next

@@ -142,7 +142,7 @@ def serve(
         raise InputError(f'dialect dcs is spoken on serial lines, not on {interface}: leave interface out, or "serial"')
     if faults:
         raise InputError("scheduled faults are the built-in CAN bus's; a serial line takes noise and lines on stdin")
-    channel = machine.name if channel is None else channel
+    channel = machine.channel if channel is None else channel
     stop = stop or SignalEvent()
     line = make_line(machine, time.monotonic(), **options)
     if axes is not None:
