@@ -295,7 +295,9 @@ def test_what_would_do_nothing_is_refused(alone: Path, monkeypatch: pytest.Monke
     with pytest.raises(rds.InputError, match=r"model.substeps = 20 is for derivatives\(\)"):
         rds.Experiment(model={"file": "m.py", "substeps": 20}, **good)
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)
-    with pytest.raises(rds.InputError, match=r"timing\.cpu = 0 cannot be chosen on this system, only on Linux; remove it"):
+    with pytest.raises(
+        rds.InputError, match=r"timing\.cpu = 0 cannot be chosen on this system, only on Linux; remove it"
+    ):
         rds.Experiment(timing={"cpu": 0}, **good)
 
 
