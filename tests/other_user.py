@@ -35,7 +35,10 @@ def open_by_mode(places: Iterable[Path]) -> list[str]:
     found = []
     for place in places:
         for path in [place, *place.rglob("*")] if place.is_dir() else [place]:
-            about = path.lstat()
+            try:
+                about = path.lstat()
+            except FileNotFoundError:  # a run's end takes it away meanwhile
+                continue
             if stat.S_IMODE(about.st_mode) & 0o077 and not stat.S_ISLNK(about.st_mode):
                 found.append(f"{path} {stat.filemode(about.st_mode)}")
     return found
