@@ -6,14 +6,15 @@
 
    All numbers are native doubles. In: the constants in the order of `struct axis`, then the reference's positions,
    velocities and accelerations, SAMPLES of each. Out: REPEATS times in ns, then the table of the last repeat, a row
-   for each sample: number, reference (3), measured position, command, voltage. */
+   for each sample: number, reference (3), measured position, command, the observer's velocity, voltage, and the plant's
+   velocity. */
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
 
-enum { COLUMNS = 7 };
+enum { COLUMNS = 9 };
 
 struct axis {
     double inverse_gain, inertia, g1, g2, L, F, G, H, limit;  /* controller and observer */
@@ -70,6 +71,8 @@ static void simulate(const struct axis *a, int samples, const double *p, const d
         y = rint(x / a->resolution) * a->resolution;
         if (k == 0)
             z = -a->L * y;
+        row[6] = k ? a->L * y + z : 0.0;
+        row[8] = w;
         u = a->inertia * (acc[k] + a->g1 * (p[k] - y) + a->g2 * (v[k] - (a->L * y + z))) + a->inverse_gain * v[k];
         if (u > a->limit)
             u = a->limit;
@@ -84,7 +87,7 @@ static void simulate(const struct axis *a, int samples, const double *p, const d
         row[5] = u;
         u = u < a->low ? a->low : u > a->high ? a->high : u;
         u = rint(u / a->step) * a->step;
-        row[6] = u;
+        row[7] = u;
         respond(a, u, &x, &w);
     }
 }

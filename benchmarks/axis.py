@@ -45,7 +45,7 @@ def parts(plan: Plan) -> tuple[Callable[[float], float], Drive, Move]:
     axis = plan.axes[0]
     assert axis.controller is not None
     c, m = axis.controller.params["coefficients"], coefficients(axis.model.params, plan.T)
-    measure, limit = encoder(axis.axis.resolution), plan.limit()
+    measure, (limit,) = encoder(axis.axis.resolution), plan.limits()
     assert measure is not None
 
     def drive(z: float, started: float, y: float, r: float, dr: float, ddr: float) -> tuple[float, float, float]:
