@@ -371,6 +371,7 @@ def test_the_machine_moves_with_the_strip(at: Callable[..., Equipment]) -> None:
     control.tab("Live")
     control.press("Show the machine")
     control.page.wait_for_selector('canvas[aria-label^="the machine at"]:visible')
+    control.page.wait_for_selector('[data-rows]:not([data-rows="0"])')  # with these it begins to play
     scrub = control.page.locator('input[aria-label="time shown"]:visible').first
     scrub.evaluate("(box) => { box.value = 250; box.dispatchEvent(new Event('input')) }")
     control.sees("X 4.9")  # a sine of 5 mm and 0.2 Hz is near its top then
