@@ -111,7 +111,9 @@ def _of_csv(path: Path, period: float | None) -> MessageTable:
             where = f"{path}:{reader.line_num + 1}"
             raise InputError(f"the line cannot be read ({error}); repair it", where) from error
         except InputError as error:  # of a message that cannot be
-            raise error if error.where else InputError(str(error), where) from error
+            if error.where:
+                raise
+            raise InputError(str(error), where) from error
     return MessageTable(messages, silent)
 
 
