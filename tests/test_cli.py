@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 import rds
-from rds.cli.main import app, progress_bars
+from rds.cli.main import HEADINGS, app, progress_bars
 
 SIMULATION = """
 axis = "X"
@@ -342,6 +342,18 @@ def test_a_command_is_built_alone_and_what_names_none_lists_all() -> None:
     assert built("bogus") == built("--help") == everything
     assert built("fit", "--help") < everything and "fit" in built("fit", "--help")
     assert "check" in built("grade", "check") and "machine" not in built("grade", "check")
+
+
+def test_help_lists_every_command_under_a_heading_in_order() -> None:
+    shown = call("--help").stdout
+    places = [shown.index(f"─ {heading} ─") for heading in HEADINGS]
+    assert places == sorted(places) and "─ Commands ─" not in shown
+    listed = [line.split()[1] for line in shown[places[0] :].splitlines() if re.match("│ [a-z]", line)]
+    assert listed == [name for names in HEADINGS.values() for name in names]
+
+
+def test_it_tells_its_version() -> None:
+    assert call("--version").stdout == f"rds {rds.__version__}\n"
 
 
 _BUILT = """

@@ -3,8 +3,9 @@
 Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained on stderr.
 
 A command is a function in a file of its own whose arguments say their help (typer); its docstring is the command's. It
-is imported and added here. What fails in it is raised as InputError inside `common.refusals()`; one that writes has the
-decorator `common.writes_files`, one whose help lists parts of a library the class `library.NamesParts`.
+is imported and added here, and named under one of the HEADINGS. What fails in it is raised as InputError inside
+`common.refusals()`; one that writes has the decorator `common.writes_files`, one whose help lists parts of a library
+the class `library.NamesParts`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.core import TyperGroup
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
@@ -76,7 +78,25 @@ from rds.core.errors import InputError
 from rds.core.private_files import keep_process_private
 from rds.modes import mode_names
 
+# `rds --help` lists the commands in this order, under these headings: what a newcomer types first is at the top.
+HEADINGS = {
+    "Experiments": ("run", "compare", "check", "learn", "robustness", "demo", "app"),
+    "Logged data, models and design": ("data", "excite", "fit", "validate", "design", "network"),
+    "Part programs": ("nc", "interpolate", "forces", "cutting", "jobs"),
+    "Machines and buses": ("machine", "scan", "jog", "estop", "doctor", "module", "drive", "bus"),
+    "Grading": ("grade",),
+    "Reference": ("library", "schema", "docs", "report"),
+}
+_ORDER = [name for names in HEADINGS.values() for name in names]
+
+
+class _InOrder(TyperGroup):
+    def list_commands(self, ctx: object) -> list[str]:
+        return sorted(self.commands, key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
+
+
 app = typer.Typer(
+    cls=_InOrder,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -131,6 +151,24 @@ for command in (machines.new, machines.show, machines.pose, machines.joints, mac
 machine_app.command()(calibrate.calibrate)
 machine_app.command("modules")(machines.modules)
 machine_app.command("watch")(machine_watch.watch)
+
+
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
+        from rds.core.installed import version  # it looks into installed packages, which no other command waits for
+
+        typer.echo(f"rds {version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _whole(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
 
 Out = Annotated[
     Path | None, typer.Option("--out", "-o", callback=results_folder, help="Folder for the results (made if missing).")
@@ -337,6 +375,19 @@ def machine_serve(
         serve_machine(machine, spoken, where, place, ready, axes=names, **options)
 
 
+def _name_of(command: CommandInfo) -> str:
+    return command.name or get_command_name(getattr(command.callback, "__name__", ""))
+
+
+for heading, names in HEADINGS.items():
+    for command_info in app.registered_commands:
+        if _name_of(command_info) in names:
+            command_info.rich_help_panel = heading
+    for group in app.registered_groups:
+        if group.name in names:
+            group.rich_help_panel = heading
+
+
 def main() -> None:
     """The console command `rds`. What runs a student's code in this process does so in a child of it."""
     put_off_asammdf()
@@ -382,10 +433,6 @@ def narrow(whole: typer.Typer, words: list[str]) -> None:
     for group in groups:
         if group.typer_instance is not None:
             narrow(group.typer_instance, words[1:])
-
-
-def _name_of(command: CommandInfo) -> str:
-    return command.name or get_command_name(getattr(command.callback, "__name__", ""))
 
 
 if __name__ == "__main__":
