@@ -43,7 +43,7 @@ def test_flat_files_and_folders_of_students(tmp_path: Path) -> None:
     assert list(found) == ["ada", "ben", "cy", "dan", "eve"]
     assert [found[name].read() for name in ("ada", "ben", "cy")] == [b"a", b"b", b"c"]
     assert found["dan"].status is found["eve"].status is Status.MISSING
-    assert "notes.txt" in found["dan"].reason
+    assert "notes.txt" in found["dan"].reason and found["dan"].notes == ()
     assert intake.ignored == ("readme.md",)
 
 
