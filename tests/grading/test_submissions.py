@@ -47,6 +47,16 @@ def test_flat_files_and_folders_of_students(tmp_path: Path) -> None:
     assert intake.ignored == ("readme.md",)
 
 
+def test_a_student_whose_folder_in_a_zip_holds_clutter_alone_is_missing(tmp_path: Path) -> None:
+    names = ("ada/controller.py", "ben/.DS_Store", "cy/__pycache__/controller.pyc", "__MACOSX/dan/._x", ".git/config")
+    packed = zipped(tmp_path / "all.zip", dict.fromkeys(names, ""))
+    assert {row.student: row.status for row in collect(packed, ACCEPTED).rows} == {
+        "ada": None,
+        "ben": Status.MISSING,
+        "cy": Status.MISSING,
+    }
+
+
 def test_nbgrader_s_tree_with_its_time(tmp_path: Path) -> None:
     tree = {
         "submitted/ada/ps1/controller.py": "a",
