@@ -314,13 +314,21 @@ def test_drafts_in_teams_are_nobody_s(around: str, tmp_path: Path) -> None:
     assert found.ignored == ("Working files",)
 
 
+@pytest.mark.parametrize("title", ["Task", "Task_1"])
+def test_blackboard_s_users_may_have_a_mark_in_their_names_that_titles_have_too(title: str, tmp_path: Path) -> None:
+    users = ("a_l", "b_l", "bob_b", "b", "cy")
+    files = {f"{title}_{user}_attempt_2026-01-09-10-00-00_controller.py": user for user in users}
+    assert {name: row.read().decode() for name, row in of(put(tmp_path, files)).items()} == {u: u for u in users}
+
+
 def test_blackboard_s_users_with_one_ending_are_kept_apart(tmp_path: Path) -> None:
-    files = {f"Task_{user}_attempt_2026-01-09-10-00-00_controller.py": user for user in ("a_l", "b_l", "cy")}
+    names = ("Task_a_l", "Work_b_l", "cy_cy")  # no title that all have
+    files = {f"{name}_attempt_2026-01-09-10-00-00_controller.py": name for name in names}
     found = of(put(tmp_path, files))
     assert {name: row.read().decode() for name, row in found.items()} == {
-        "Task_a_l": "a_l",
-        "Task_b_l": "b_l",
-        "cy": "cy",
+        "Task_a_l": "Task_a_l",
+        "Work_b_l": "Work_b_l",
+        "cy": "cy_cy",
     }
 
 

@@ -16,6 +16,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from os.path import commonprefix
 from typing import Any
 
 from rds.grading.intake.attempts import dashed_time, is_dated, is_version
@@ -244,12 +245,17 @@ class _Sorting:
         for match in found:
             if match is not None:
                 users.setdefault(match["user"], set()).add(match["before"])
+        befores = sorted(set().union(*users.values()))
+        shared = commonprefix(befores) if len(befores) > 1 else ""
+        title = shared[: shared.rfind("_") + 1]  # of the assignment; a user's name may hold a `_` as well
         for item, match in zip(items, found, strict=True):
             if match is None:
                 self.plain(item)
                 continue
-            alone = len(users[match["user"]]) == 1  # else names with _ in them end alike
-            handed = self.files_of(match["user"] if alone else match["before"], platform="blackboard")
+            user = match["before"].removeprefix(title) if title else match["user"]
+            if not title and len(users[user]) > 1:  # names with _ in them end alike
+                user = match["before"]
+            handed = self.files_of(user, platform="blackboard")
             handed.has_times = True
             if match["file"]:
                 when = dashed_time(match["time"])
