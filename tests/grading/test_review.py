@@ -207,6 +207,15 @@ def test_a_grader_error_in_one_attempt_is_no_zero_beside_another(tmp_path: Path)
     assert ben.notes[-1] == "Points of 2 attempts: 1: 26 (counts), 2: grader error."
 
 
+def test_points_by_hand_for_nothing_handed_in_are_an_attempt(tmp_path: Path) -> None:
+    first = made(tmp_path / "1", grade("ada", Status.MISSING, score(points=0.0)))
+    second = made(tmp_path / "2", grade("ada", Status.OK, score(points=0.0)))
+    (second / "batch.json").write_text((first / "batch.json").read_text())
+    say(first, [points(5.0, comment="shown in the laboratory")])
+    (ada,) = best([first, second], tmp_path / "best").grades
+    assert ada.score == 5.0
+
+
 def test_who_changes_is_told_with_the_reason(tmp_path: Path) -> None:
     before = read_finished(made(tmp_path / "1", grade("ada", Status.OK, score(), score("old", 1.0))))
     new = (replace(score(points=8.0), value=0.23), score("new", 2.0))
