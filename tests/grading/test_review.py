@@ -78,6 +78,8 @@ def test_extensions_and_late_days_move_what_is_lost(extension: float, left: int 
     member = Member("ada", extension_days=extension, late_days=left)
     found = reviewed(late, LATE, member, [])
     assert found.score == pytest.approx(26.0 * (1.0 - 0.1 * lost))
+    excused = reviewed(late, LATE, member, [Entry(Kind.EXCUSE, "ann", "ada")])
+    assert of_review(excused)["late_days_spent"] == 0
 
 
 def test_an_excused_student_has_no_score_and_is_in_no_gradebook(tmp_path: Path) -> None:
