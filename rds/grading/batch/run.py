@@ -133,13 +133,15 @@ def _unlisted(listed: ClassList, intake: Intake) -> list[str]:
 
 def _untimed(assignment: Assignment, intake: Intake) -> list[str]:
     """That lateness costs points, and that nobody knows when some have handed in."""
-    unknown = [row.student for row in intake.rows if row.time is None]
-    if assignment.due is None or assignment.late == LateRules() or not unknown:
+    if assignment.due is None or assignment.late == LateRules():
         return []
-    notes = [
-        f"when they handed in is not known of {len(unknown)} of {len(intake.rows)} submissions, so nothing is deducted "
-        "for lateness there; timestamps.csv (student,timestamp) at the top of the submissions says it"
-    ]
+    handed_in = [row for row in intake.rows if row.status is not Status.MISSING]
+    count, notes = sum(row.time is None for row in handed_in), []
+    if count:
+        notes.append(
+            f"when they handed in is not known of {count} of {len(handed_in)} submissions, so nothing is deducted for "
+            "lateness there; timestamps.csv (student,timestamp) at the top of the submissions says it"
+        )
     for row in intake.rows:
         unread = [note for note in row.notes if row.time is None and note.startswith(NOT_UNDERSTOOD)]
         notes.extend(f"{row.student}: {note}" for note in unread)
