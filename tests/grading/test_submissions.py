@@ -58,6 +58,14 @@ def test_a_student_whose_folder_in_a_zip_holds_clutter_alone_is_missing(tmp_path
     }
 
 
+def test_a_late_file_that_ilias_calls_otherwise_is_told_beside_the_one_that_is_graded(tmp_path: Path) -> None:
+    names = ("controller.py", "Late Submission - controller (2).py", "helpers.py")
+    put(tmp_path, {f"ada/{name}": name for name in names})
+    ada = of(tmp_path)["ada"]
+    assert ada.read() == b"controller.py"
+    assert ada.notes == ("controller.py is graded, and not Late Submission - controller (2).py",)
+
+
 def test_nbgrader_s_tree_with_its_time(tmp_path: Path) -> None:
     tree = {
         "submitted/ada/ps1/controller.py": "a",
