@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -120,3 +121,23 @@ def test_two_files_of_one_student_of_the_list_refuse_each_other_and_nobody_else(
     assert set(rows) == {"cy", "somebody", "zoe", "red"} and rows["zoe"].status is None
     assert all(rows[name].status is Status.REFUSED for name in ("cy", "somebody"))
     assert rows["cy"].reason.startswith("cy, somebody are one student of the class list, cy; keep one")
+
+
+def test_of_two_with_one_name_none_gets_a_zero_for_the_file_of_the_other() -> None:
+    known = ClassList(
+        (Member("a1", "Ada Lovelace"), Member("a2", "Ada Lovelace"), Member("b", "Ben"), Member("c", "Cy"))
+    )
+    ada = row("Ada Lovelace_501", source={"platform": "moodle", "name": "Ada Lovelace", "id": "501"})
+    rows = {each.student: each for each in by_group(Intake("moodle", (ada, row("b"))), known).rows}
+    assert {name: each.status for name, each in rows.items() if each.status} == {
+        "a1": Status.GRADER_ERROR,
+        "a2": Status.GRADER_ERROR,
+        "c": Status.MISSING,
+    }
+    assert "'Ada Lovelace_501' may be this student's or a namesake's" in rows["a1"].reason
+    mended = ClassList((Member("Ada Lovelace_501", "Ada Lovelace"), *known.members[1:]))
+    rows = {each.student: each for each in by_group(Intake("moodle", (ada, row("b"))), mended).rows}
+    assert rows["Ada Lovelace_501"].status is None and rows["a2"].status is Status.MISSING
+    team = ClassList((*(replace(each, group="red") for each in known.members[:1]), *known.members[1:]))
+    rows = {each.student: each for each in by_group(Intake("moodle", (ada,)), team).rows}
+    assert rows["red"].status is rows["a2"].status is Status.GRADER_ERROR

@@ -76,6 +76,12 @@ class ClassList:
             or self._one(map(_letters, names), lambda each: _letters(each.name))
         )
 
+    def namesakes(self, student: str, source: Mapping[str, Any]) -> list[Member]:
+        """Several of one name, of whom it may be any who handed in as `student`; none where `find` knows."""
+        name = _letters(str(source.get("name") or student))
+        found = [each for each in self.members if each.name and _letters(each.name) == name]
+        return found if len(found) > 1 and self.find(student, source) is None else []
+
     def _one(self, said: Iterable[str], of: Callable[[Member], str]) -> Member | None:
         wanted = {_compared(text) for text in said if text}
         found = [each for each in self.members if of(each) and _compared(of(each)) in wanted]

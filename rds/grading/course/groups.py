@@ -11,6 +11,10 @@ from rds.grading.grade import Status
 from rds.grading.intake import HandedIn, Intake
 
 NOTHING = "nothing was handed in"
+_DOUBT = (
+    "{!r} may be this student's or a namesake's; write that as the student of one of them in the class list, and grade "
+    "into a new folder"
+)
 
 
 def by_group(intake: Intake, listed: ClassList) -> Intake:
@@ -18,9 +22,15 @@ def by_group(intake: Intake, listed: ClassList) -> Intake:
 
     The files of a group's members become one row with the group's name: the last that was handed in. Where nobody says
     which was the last, the row is refused, with the names; so are rows that are one student of the list. Students and
-    groups of the list without a file are *missing*.
+    groups of the list without a file are *missing*; but a *grader error* where a file may be theirs, or a namesake's.
     """
     groups = listed.groups()
+    doubts = {
+        member.student: _DOUBT.format(row.student)
+        for row in intake.rows
+        if row.student not in groups
+        for member in listed.namesakes(row.student, row.source)
+    }
     members = [listed.find(row.student, row.source) for row in intake.rows]
     of_member: dict[str, list[str]] = {}
     for row, member in zip(intake.rows, members, strict=True):
@@ -37,16 +47,23 @@ def by_group(intake: Intake, listed: ClassList) -> Intake:
             of_group[name].append(row)
         else:
             rows.append(row)
-    rows += [_of_group(name, handed_in) for name, handed_in in of_group.items()]
+    for name, handed_in in of_group.items():
+        doubt = next((doubts[each.student] for each in groups[name] if each.student in doubts), "")
+        rows.append(_of_group(name, handed_in, doubt))
     rows += [
-        HandedIn(each.student, status=Status.MISSING, reason=NOTHING, source=dict(each.source))
+        _without_file(each.student, doubts.get(each.student, ""), dict(each.source))
         for each in listed.members
         if not each.group and each.student not in of_member
     ]
     return replace(intake, rows=tuple(sorted(rows, key=lambda row: row.student)))
 
 
-def _of_group(name: str, rows: Sequence[HandedIn]) -> HandedIn:
+def _without_file(name: str, doubt: str, source: dict[str, Any]) -> HandedIn:
+    status = Status.GRADER_ERROR if doubt else Status.MISSING
+    return HandedIn(name, status=status, reason=doubt or NOTHING, source=source)
+
+
+def _of_group(name: str, rows: Sequence[HandedIn], doubt: str) -> HandedIn:
     """What counts of all that a group's members handed in."""
     by: dict[str, Any] = {}
     for row in rows:  # of a batch that is graded again the row is a group's already
@@ -54,7 +71,7 @@ def _of_group(name: str, rows: Sequence[HandedIn]) -> HandedIn:
     about = {"handed_in_by": by}
     given = [row for row in rows if row.status is not Status.MISSING]
     if not given:
-        return HandedIn(name, status=Status.MISSING, reason=NOTHING, source=about)
+        return _without_file(name, doubt, about)
     times = [row.time for row in given if row.time is not None]
     if len(given) == 1:
         last = given[0]
