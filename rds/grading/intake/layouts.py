@@ -132,7 +132,8 @@ def sorted_out(
         return sorting.layout("nbgrader", times)
     prefix = of_classroom(folders, around or place)
     for item in items:
-        sorting.plain(replace(item, parts=(item.parts[0].removeprefix(prefix), *item.parts[1:])))
+        own = replace(item, parts=(item.parts[0].removeprefix(prefix), *item.parts[1:])) if prefix else item
+        sorting.plain(own)
     for folder in folders:
         sorting.files_of(folder.removeprefix(prefix))
     sorting.ilias(folders)
