@@ -9,10 +9,15 @@ from pathlib import Path
 import pytest
 
 from rds.core.errors import InputError
+from rds.grading.assignment.late_rules import LateRules
+from rds.grading.batch.run import _unlisted
 from rds.grading.course.class_list import ClassList, Member, read_class_list
-from rds.grading.course.groups import by_group
+from rds.grading.course.groups import by_group, with_groups_of_export, without_groups_of_export
 from rds.grading.grade import Status
 from rds.grading.intake import HandedIn, Intake
+from rds.grading.review.entries import Review
+from rds.grading.review.everyone import everyone
+from tests.grading.grades import grade
 
 TEXT = """student,name,email,section,group,extension_days,late_days
 ada,Ada Lovelace,ada@example.edu,A,red,0,3
@@ -141,3 +146,37 @@ def test_of_two_with_one_name_none_gets_a_zero_for_the_file_of_the_other() -> No
     team = ClassList((*(replace(each, group="red") for each in known.members[:1]), *known.members[1:]))
     rows = {each.student: each for each in by_group(Intake("moodle", (ada,)), team).rows}
     assert rows["red"].status is rows["a2"].status is Status.GRADER_ERROR
+
+
+def test_each_member_of_a_group_of_gradescope_gets_its_grade() -> None:
+    people = [
+        {"name": name, "sid": sid, "email": f"{name}@x"} for name, sid in (("Ada", "1"), ("Ben", ""), ("Cy", "9"))
+    ]
+    about = {**people[0], "submission": "submission_7", "members": people}
+    handed_in = Intake("gradescope", (row("1", 9, source=about), row("zoe")))
+    known = ClassList((Member("1"), Member("b", email="ben@x"), Member("dan"), Member("zoe")))
+    intake, with_groups = with_groups_of_export(handed_in, known)
+    assert {each.student: each.group for each in with_groups.members if each.group} == dict.fromkeys(
+        "1b", "submission_7"
+    )
+    rows = {each.student: each for each in by_group(intake, with_groups).rows}
+    assert {name: each.status for name, each in rows.items()} == {
+        "submission_7": None,
+        "dan": Status.MISSING,
+        "zoe": None,
+    }
+    own_row = Intake("gradescope", (*handed_in.rows, row("b")))  # who handed in apart, whatever others say
+    for one, other in ((own_row, known), (handed_in, ClassList((Member("1", email="mal@x"), *known.members[1:])))):
+        assert not {each.student for each in with_groups_of_export(one, other)[1].members if each.group} >= {"1", "b"}
+    sources = {name: each.source for name, each in rows.items()}
+    assert without_groups_of_export(with_groups, sources) == known  # in the list for the next assignment
+    assert _unlisted(with_groups, by_group(intake, with_groups)) == ["not in the class list: 9"]
+    for later in (intake, handed_in):  # graded again, and resumed
+        again = with_groups_of_export(later, with_groups)
+        assert again == (intake, with_groups)
+    measured = grade("submission_7", details={"source": rows["submission_7"].source})
+    found = everyone([measured], with_groups, Review(), LateRules())
+    assert {name: (each.score, each.details["source"].get("sid")) for name, (each, _) in found.items()} == {
+        "1": (26.0, "1"),
+        "b": (26.0, None),
+    }

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +16,41 @@ _DOUBT = (
     "{!r} may be this student's or a namesake's; write that as the student of one of them in the class list, and grade "
     "into a new folder"
 )
+
+
+def with_groups_of_export(intake: Intake, listed: ClassList) -> tuple[Intake, ClassList]:
+    """The same, with the groups that an export (Gradescope's) names of students who have none in the class list.
+
+    Such a group is called as its submission is there; a row is that of the group. Users write their number themselves:
+    it makes nobody a member who has another e-mail address in the list, or has handed in apart.
+    """
+    students = {each.student for each in listed.members}
+    own = [listed.find(row.student, row.source) for row in intake.rows]
+    alone = Counter(each.student for each in own if each is not None)
+    groups: dict[str, str] = {}  # by student
+    rows = []
+    for row, first in zip(intake.rows, own, strict=True):
+        people, name = row.source.get("members"), str(row.source.get("submission", ""))
+        members: dict[str, str] = {}
+        for each in people if isinstance(people, list) else ():
+            found = listed.find(each["sid"] or each["email"], each)
+            if found is None or found.group not in ("", name) or alone[found.student] > (found == first):
+                continue
+            if found.email.casefold() in ("", each["email"].casefold()):
+                members[found.student] = name
+        if members and name and name not in students and row.student != name:
+            groups |= members
+            row = replace(row, student=name, source={**row.source, "handed_in_by": {row.student: row.source}})
+        rows.append(row)
+    grouped = tuple(replace(each, group=groups.get(each.student, each.group)) for each in listed.members)
+    return replace(intake, rows=tuple(rows)), ClassList(grouped)
+
+
+def without_groups_of_export(listed: ClassList, sources: Mapping[str, Mapping[str, Any]]) -> ClassList:
+    """The list without those groups, which are of one assignment; `sources` are what the export said, by group."""
+    of_export = {name for name, about in sources.items() if about.get("submission") == name}
+    members = (replace(each, group="") if each.group in of_export else each for each in listed.members)
+    return ClassList(tuple(members))
 
 
 def by_group(intake: Intake, listed: ClassList) -> Intake:
