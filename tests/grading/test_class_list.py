@@ -87,7 +87,8 @@ def test_the_number_of_a_participant_in_moodle_is_no_student_s() -> None:
 
 def row(student: str, hour: int | None = None, **more: object) -> HandedIn:
     time = None if hour is None else datetime(2026, 1, 10, hour, tzinfo=UTC)
-    return HandedIn(student, f"{student}.py", time=time, **more)  # type: ignore[arg-type]
+    given: dict[str, object] = {"read": student.encode} | more
+    return HandedIn(student, f"{student}.py", time=time, **given)  # type: ignore[arg-type]
 
 
 def test_the_last_file_of_a_group_counts_and_nobody_is_forgotten(tmp_path: Path) -> None:
@@ -180,3 +181,18 @@ def test_each_member_of_a_group_of_gradescope_gets_its_grade() -> None:
         "1": (26.0, "1"),
         "b": (26.0, None),
     }
+
+
+@pytest.mark.parametrize("team", ["", "red", "SS26-A"])
+def test_moodle_s_copies_of_a_group_s_file_are_its_members(team: str) -> None:
+    def copy(name: str, number: str, text: bytes = b"same", hour: int | None = 9) -> HandedIn:
+        about = {"platform": "moodle", "name": f"SS26-A-{name}", "id": number}
+        return row(f"SS26-A-{name}_{number}", hour, source=about, read=lambda: text)
+
+    known = ClassList((Member("a", "Ada Lovelace", group=team), Member("b", "Ben Bär-Maß", group=team)))
+    for hour in (9, None):
+        copies = copy("Ada Lovelace", "501", hour=hour), copy("Ben Bär-Maß", "502", hour=hour)
+        rows = by_group(Intake("moodle", copies), known).rows
+        assert [each.status for each in rows] == [None] * (1 if team else 2) and not any(each.notes for each in rows)
+    others = copy("Ada Lovelace", "501"), copy("Ben Bär-Maß", "502", b"other")
+    assert by_group(Intake("moodle", others), known).rows[0].status is (Status.REFUSED if team else None)

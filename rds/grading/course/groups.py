@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
+from hashlib import sha256
 from typing import Any
 
 from rds.grading.course.class_list import ClassList
 from rds.grading.grade import Status
 from rds.grading.intake import HandedIn, Intake
+from rds.grading.intake.items import Refusal
 
 NOTHING = "nothing was handed in"
+_BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
 _DOUBT = (
     "{!r} may be this student's or a namesake's; write that as the student of one of them in the class list, and grade "
     "into a new folder"
@@ -109,15 +113,24 @@ def _of_group(name: str, rows: Sequence[HandedIn], doubt: str) -> HandedIn:
     if not given:
         return _without_file(name, doubt, about)
     times = [row.time for row in given if row.time is not None]
-    if len(given) == 1:
-        last = given[0]
-    elif len(times) == len(given) and times.count(max(times)) == 1:
-        last = next(row for row in given if row.time == max(times))
+    latest = [row for row in given if row.time == max(times)] if len(times) == len(given) else given
+    if len(latest) == 1 or _are_copies(latest):  # Moodle hands out a copy for each member
+        last = max(latest, key=lambda row: row.time or _BEFORE_ALL)
     else:
         who = ", ".join(row.student for row in given)
         reason = f"{who} of group {name} handed in, and nobody says which was the last; keep one, or give times"
         return HandedIn(name, status=Status.REFUSED, reason=reason, source=about)
     notes = last.notes
-    if len(given) > 1:
+    if len(given) > len(latest):
         notes = (*notes, f"Of group {name} the file of {last.student} is graded, the last that was handed in.")
     return replace(last, student=name, notes=notes, source={**last.source, **about})
+
+
+def _are_copies(rows: Sequence[HandedIn]) -> bool:
+    """Whether it does not matter whose file it is."""
+    if any(row.status is not None for row in rows):
+        return False
+    try:
+        return len({sha256(row.read()).digest() for row in rows}) == 1
+    except Refusal:
+        return False
