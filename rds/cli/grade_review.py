@@ -167,6 +167,7 @@ def late_days(
         from rds.core.atomic import write_whole
         from rds.core.errors import InputError
         from rds.grading.batch.finished import read_finished
+        from rds.grading.course.groups import without_groups_of_export
         from rds.grading.review.applied import of_review
 
         finished = read_finished(out)
@@ -181,7 +182,9 @@ def late_days(
             member = finished.listed.find(grade.student, source if isinstance(source, dict) else None)
             if member is not None:
                 spent[member.student] = int(of_review(grade).get("late_days_spent", 0))
-        write_whole(file, finished.listed.with_late_days(spent).to_csv())
+        sources = {name: grade.details.get("source") or {} for name, grade in finished.measured.items()}
+        after = without_groups_of_export(finished.listed.with_late_days(spent), sources)
+        write_whole(file, after.to_csv())
     if json:
         print_json({"spent": spent, "file": str(file)})
     else:

@@ -68,6 +68,13 @@ def write_private(path: str | Path, data: bytes, is_own: bool = False) -> None:
         file.write(data)
 
 
+def state_folder() -> Path:
+    """Where rds keeps what lasts from one run to the next, in the user's home; it need not be there yet."""
+    state = os.environ.get("XDG_STATE_HOME", "")
+    base = Path(state) if os.path.isabs(state) else Path(os.path.expanduser("~"), ".local", "state")
+    return base / "rds"
+
+
 def make_folder(path: str | Path) -> None:
     """Make a folder, and those above it that are not there, each private. OSError where that cannot be.
 

@@ -90,16 +90,17 @@ def notes_of(validation: Validation) -> list[str]:
 
 
 def check_program(
-    program: Path, machine: Machine, setup: Setup, progress: Progress | None = None
+    program: Path, machine: Machine, setup: Setup, progress: Progress | None = None, place: Path | None = None
 ) -> tuple[Validation, Path | None]:
-    """Whether a machine can run a program: all faults, and the compiled form that a valid one leaves beside it.
+    """Whether a machine can run a program: all faults, and the compiled form that a valid one leaves at `place`.
 
-    A program with faults leaves none, and one of before is removed. Raises InputError for files that cannot be read or
-    written, and where the place of the compiled form is taken by a file that is none.
+    The default is beside the program. A program with faults leaves none, and one of before is removed. Raises
+    InputError for files that cannot be read or written, and where the place of the compiled form is taken by a file
+    that is none.
     """
     setup = setup.on(machine, program)
     header = describe(program, machine, setup)
-    place = beside(program)
+    place = place or beside(program)
     if place.exists() and not is_ours(place):
         raise InputError("is no compiled program, and one would be written here; rename or move it", str(place))
     validator = validator_of(program, machine, setup)
@@ -157,16 +158,17 @@ def _summary(validator: Validator) -> dict[str, Any]:
 
 
 def compiled_if_current(program: Path, machine: Machine, setup: Setup) -> Compiled | None:
-    """The compiled form beside a program, if it was made of just this program, machine, tools and options.
+    """The compiled form beside a program, if this user's rds made it of just this program, machine, tools and options.
 
-    None where there is none, or it is of something else, or damaged. Raises InputError when the program can't be read.
+    None where there is none, or it is of something else or somebody else, or damaged. Raises InputError when the
+    program can't be read.
     """
     wanted = describe(program, machine, setup)
     try:
         found = open_compiled(beside(program))
     except InputError:
         return None
-    return found if dict(found.header) == wanted else None
+    return found if found.is_own and dict(found.header) == wanted else None
 
 
 def describe(program: Path, machine: Machine, setup: Setup) -> dict[str, Any]:

@@ -1,17 +1,22 @@
 """The compiled program: machine motion on disk, beside the part program it was made of (oacs-thesis 7.3: a .dat file).
 
-The file, format 1 (docs/part-programs.md): the line `RDS compiled part program 1`; a line of JSON, the header, which
+The file, format 2 (docs/part-programs.md): the line `RDS compiled part program 2`; a line of JSON, the header, which
 names everything the motion depends on with its SHA-256; then of each block a line of JSON (`segments`: how many,
 `file`, `tool`, `events`: [after, kind, value, line] each), its segments as they are in memory, records of dtype SEGMENT
 in little-endian byte order, and their feed lines (int32 each); last a line of JSON with `"end": true` and the number of
-blocks and segments, and the SHA-256 of all bytes before it as 64 characters and a line feed.
+blocks and segments, and the SHA-256 of all bytes before it as 64 characters, 64 more that only who has the user's own
+key could write (HMAC of that SHA-256), and a line feed.
 """
 
 from __future__ import annotations
 
 import hashlib
+import hmac
 import json
+import os
+import secrets
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -19,13 +24,16 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.private_files import make_folder, state_folder, write_private
 from rds.interpolators.motion.segments import SEGMENT
 from rds.nc.path_block import Event, PathBlock
 
-MAGIC = b"RDS compiled part program 1\n"
+MAGIC = b"RDS compiled part program 2\n"
 _STORED = SEGMENT.newbyteorder("<")
 _LINES = np.dtype("<i4")
-_DIGEST = 65  # characters at the end
+_DIGEST, _SEAL = 64, 64  # characters at the end, before a line feed
+_END = _DIGEST + _SEAL + 1
+_KEY = 32  # bytes
 _CHUNK = 1 << 20
 _LONGEST_LAST = 1 << 16  # bytes of the last line, which names the tools and has notes
 _AGAIN = "compile it again with `rds nc check`"
@@ -81,9 +89,33 @@ def write_compiled(
             count += 1
             segments += len(block)
         put(_line({"end": True, "blocks": count, "segments": segments, **after()}))
-        stream.write(digest.hexdigest().encode() + b"\n")
+        found = digest.hexdigest()
+        stream.write(f"{found}{_seal(found)}\n".encode())
 
     return write
+
+
+def _seal(digest: str) -> str:
+    return hmac.new(_own_key(), digest.encode(), hashlib.sha256).hexdigest()
+
+
+def _own_key() -> bytes:
+    """The user's, made when it is first asked for. Where it cannot be kept, another one each time: nothing is known."""
+    place, made = state_folder() / "compiled.key", secrets.token_bytes(_KEY)
+    try:
+        with place.open("rb") as stream:
+            key = stream.read(_KEY + 1)
+            is_own = not hasattr(os, "getuid") or os.fstat(stream.fileno()).st_uid == os.getuid()
+        if len(key) == _KEY or not is_own:
+            return key if is_own else made
+    except FileNotFoundError:
+        pass
+    except OSError:
+        return made
+    with suppress(OSError):
+        make_folder(place.parent)
+        write_private(place, made, is_own=True)
+    return made
 
 
 def _line(value: Mapping[str, Any]) -> bytes:
@@ -92,11 +124,15 @@ def _line(value: Mapping[str, Any]) -> bytes:
 
 @dataclass(frozen=True)
 class Compiled:
-    """A compiled program, whole: its bytes have the checksum at its end. `trailer` is its last line."""
+    """A compiled program, whole: its bytes have the checksum at its end. `trailer` is its last line.
+
+    `is_own`: whether this user's rds has made it, and nobody else.
+    """
 
     path: Path
     header: Mapping[str, Any]
     trailer: Mapping[str, Any]
+    is_own: bool = False
 
     def blocks(self) -> Iterator[PathBlock]:
         """Its motion, block by block, read as it goes."""
@@ -118,15 +154,16 @@ def open_compiled(path: Path) -> Compiled:
             if stream.readline(len(MAGIC)) != MAGIC:
                 raise InputError(f"is no compiled part program of this version; {_AGAIN}", str(path))
             header = _read_json(stream.readline(), path)
-            _check(stream, path)
+            is_own = _check(stream, path)
             trailer = _read_json(_last_line(stream), path)
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror}); {_AGAIN}", str(path)) from error
-    return Compiled(path, header, trailer)
+    return Compiled(path, header, trailer, is_own)
 
 
-def _check(stream: BinaryIO, path: Path) -> None:
-    size = stream.seek(0, 2) - _DIGEST
+def _check(stream: BinaryIO, path: Path) -> bool:
+    """InputError where it is damaged; whether it is this user's own."""
+    size = stream.seek(0, 2) - _END
     stream.seek(0)
     digest = hashlib.sha256()
     left = max(size, 0)
@@ -134,12 +171,14 @@ def _check(stream: BinaryIO, path: Path) -> None:
         data = stream.read(min(left, _CHUNK))
         digest.update(data)
         left -= len(data)
-    if size < 0 or stream.read(_DIGEST) != digest.hexdigest().encode() + b"\n":
+    found, last = digest.hexdigest(), stream.read(_END)
+    if size < 0 or last[:_DIGEST] != found.encode() or last[-1:] != b"\n":
         raise InputError(f"is damaged: its bytes do not have the checksum at its end; {_AGAIN}", str(path))
+    return hmac.compare_digest(last[_DIGEST:-1], _seal(found).encode())
 
 
 def _last_line(stream: BinaryIO) -> bytes:
-    end = stream.seek(0, 2) - _DIGEST
+    end = stream.seek(0, 2) - _END
     stream.seek(max(0, end - _LONGEST_LAST))
     data = stream.read(min(end, _LONGEST_LAST))
     return data[max(data.rfind(b'{"end":true'), 0) :]  # the records before it end with no line feed

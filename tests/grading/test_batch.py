@@ -95,6 +95,7 @@ def test_who_is_late_loses_and_whose_notebook_was_cut_is_told(outcome: BatchOutc
     assert ivy.late_days == pytest.approx(2.0 - 1.0 / 24.0)
     assert ivy.score == pytest.approx(0.8 * ivy.before_penalty)
     assert outcome.grades["ada"].late_days == 0.0
+    assert any("is not known of 8 of 9 submissions" in note for note in outcome.notes)  # and flo handed in nothing
     assert any("only these are graded" in note for note in gus.notes)
 
 

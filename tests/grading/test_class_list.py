@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from rds.core.errors import InputError
+from rds.grading.assignment.late_rules import LateRules
+from rds.grading.batch.run import _unlisted
 from rds.grading.course.class_list import ClassList, Member, read_class_list
-from rds.grading.course.groups import by_group
+from rds.grading.course.groups import by_group, with_groups_of_export, without_groups_of_export
 from rds.grading.grade import Status
 from rds.grading.intake import HandedIn, Intake
+from rds.grading.review.entries import Review
+from rds.grading.review.everyone import everyone
+from tests.grading.grades import grade
 
 TEXT = """student,name,email,section,group,extension_days,late_days
 ada,Ada Lovelace,ada@example.edu,A,red,0,3
@@ -81,7 +87,8 @@ def test_the_number_of_a_participant_in_moodle_is_no_student_s() -> None:
 
 def row(student: str, hour: int | None = None, **more: object) -> HandedIn:
     time = None if hour is None else datetime(2026, 1, 10, hour, tzinfo=UTC)
-    return HandedIn(student, f"{student}.py", time=time, **more)  # type: ignore[arg-type]
+    given: dict[str, object] = {"read": student.encode} | more
+    return HandedIn(student, f"{student}.py", time=time, **given)  # type: ignore[arg-type]
 
 
 def test_the_last_file_of_a_group_counts_and_nobody_is_forgotten(tmp_path: Path) -> None:
@@ -120,3 +127,72 @@ def test_two_files_of_one_student_of_the_list_refuse_each_other_and_nobody_else(
     assert set(rows) == {"cy", "somebody", "zoe", "red"} and rows["zoe"].status is None
     assert all(rows[name].status is Status.REFUSED for name in ("cy", "somebody"))
     assert rows["cy"].reason.startswith("cy, somebody are one student of the class list, cy; keep one")
+
+
+def test_of_two_with_one_name_none_gets_a_zero_for_the_file_of_the_other() -> None:
+    known = ClassList(
+        (Member("a1", "Ada Lovelace"), Member("a2", "Ada Lovelace"), Member("b", "Ben"), Member("c", "Cy"))
+    )
+    ada = row("Ada Lovelace_501", source={"platform": "moodle", "name": "Ada Lovelace", "id": "501"})
+    rows = {each.student: each for each in by_group(Intake("moodle", (ada, row("b"))), known).rows}
+    assert {name: each.status for name, each in rows.items() if each.status} == {
+        "a1": Status.GRADER_ERROR,
+        "a2": Status.GRADER_ERROR,
+        "c": Status.MISSING,
+    }
+    assert "'Ada Lovelace_501' may be this student's or a namesake's" in rows["a1"].reason
+    mended = ClassList((Member("Ada Lovelace_501", "Ada Lovelace"), *known.members[1:]))
+    rows = {each.student: each for each in by_group(Intake("moodle", (ada, row("b"))), mended).rows}
+    assert rows["Ada Lovelace_501"].status is None and rows["a2"].status is Status.MISSING
+    team = ClassList((*(replace(each, group="red") for each in known.members[:1]), *known.members[1:]))
+    rows = {each.student: each for each in by_group(Intake("moodle", (ada,)), team).rows}
+    assert rows["red"].status is rows["a2"].status is Status.GRADER_ERROR
+
+
+def test_each_member_of_a_group_of_gradescope_gets_its_grade() -> None:
+    people = [
+        {"name": name, "sid": sid, "email": f"{name}@x"} for name, sid in (("Ada", "1"), ("Ben", ""), ("Cy", "9"))
+    ]
+    about = {**people[0], "submission": "submission_7", "members": people}
+    handed_in = Intake("gradescope", (row("1", 9, source=about), row("zoe")))
+    known = ClassList((Member("1"), Member("b", email="ben@x"), Member("dan"), Member("zoe")))
+    intake, with_groups = with_groups_of_export(handed_in, known)
+    assert {each.student: each.group for each in with_groups.members if each.group} == dict.fromkeys(
+        "1b", "submission_7"
+    )
+    rows = {each.student: each for each in by_group(intake, with_groups).rows}
+    assert {name: each.status for name, each in rows.items()} == {
+        "submission_7": None,
+        "dan": Status.MISSING,
+        "zoe": None,
+    }
+    own_row = Intake("gradescope", (*handed_in.rows, row("b")))  # who handed in apart, whatever others say
+    for one, other in ((own_row, known), (handed_in, ClassList((Member("1", email="mal@x"), *known.members[1:])))):
+        assert not {each.student for each in with_groups_of_export(one, other)[1].members if each.group} >= {"1", "b"}
+    sources = {name: each.source for name, each in rows.items()}
+    assert without_groups_of_export(with_groups, sources) == known  # in the list for the next assignment
+    assert _unlisted(with_groups, by_group(intake, with_groups)) == ["not in the class list: 9"]
+    for later in (intake, handed_in):  # graded again, and resumed
+        again = with_groups_of_export(later, with_groups)
+        assert again == (intake, with_groups)
+    measured = grade("submission_7", details={"source": rows["submission_7"].source})
+    found = everyone([measured], with_groups, Review(), LateRules())
+    assert {name: (each.score, each.details["source"].get("sid")) for name, (each, _) in found.items()} == {
+        "1": (26.0, "1"),
+        "b": (26.0, None),
+    }
+
+
+@pytest.mark.parametrize("team", ["", "red", "SS26-A"])
+def test_moodle_s_copies_of_a_group_s_file_are_its_members(team: str) -> None:
+    def copy(name: str, number: str, text: bytes = b"same", hour: int | None = 9) -> HandedIn:
+        about = {"platform": "moodle", "name": f"SS26-A-{name}", "id": number}
+        return row(f"SS26-A-{name}_{number}", hour, source=about, read=lambda: text)
+
+    known = ClassList((Member("a", "Ada Lovelace", group=team), Member("b", "Ben Bär-Maß", group=team)))
+    for hour in (9, None):
+        copies = copy("Ada Lovelace", "501", hour=hour), copy("Ben Bär-Maß", "502", hour=hour)
+        rows = by_group(Intake("moodle", copies), known).rows
+        assert [each.status for each in rows] == [None] * (1 if team else 2) and not any(each.notes for each in rows)
+    others = copy("Ada Lovelace", "501"), copy("Ben Bär-Maß", "502", b"other")
+    assert by_group(Intake("moodle", others), known).rows[0].status is (Status.REFUSED if team else None)

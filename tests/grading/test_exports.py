@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.grading.batch.grades_table import csv_text, grades_csv
-from rds.grading.exports import GRADEBOOKS
+from rds.grading.exports import GRADEBOOKS, prairielearn
 from rds.grading.exports.export import Written, export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.exports.one_json import LARGEST
@@ -329,6 +329,14 @@ def test_prairielearn_is_valid_and_no_larger_than_it_may_be(tmp_path: Path) -> N
     assert first["score"] == pytest.approx(26 / 30)
     assert [image["label"] for image in first["images"]] == ["case 0", "case 1"]
     assert "1 of 3 pictures" in done.notes[0]
+
+
+def test_points_by_hand_for_a_file_that_could_not_be_loaded_reach_prairielearn() -> None:
+    failed = grade("ada", Status.FAILED_TO_LOAD)
+    assert "score" not in prairielearn.results(failed, [])
+    marked = prairielearn.results(replace(failed, score=12.0, before_penalty=15.0), [])
+    hold_against(PRAIRIELEARN, marked)
+    assert marked["score"] == pytest.approx(12 / 30) and "failed to load" in marked["message"]
 
 
 def test_what_the_grader_could_not_grade_is_a_zero_nowhere(tmp_path: Path) -> None:

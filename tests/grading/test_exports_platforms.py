@@ -105,6 +105,8 @@ def test_blackboard_gets_its_own_file_back_with_one_column(tmp_path: Path) -> No
         "Builder\tBob\tbob\t502\t",  # handed in nothing: his cell is as it was
     ]
     assert "1 of the gradebook have no grade here, and their cells stay as they are: bob" in done.notes[0]
+    excused = [grade("ada"), grade("bob", Status.EXCUSED)]  # whose cell stays as it is as well, on purpose
+    assert not exported(tmp_path / "x", "blackboard", excused, wanted=ExportOptions(tmp_path / "down.xls")).notes
     assert set(done.left_out) == {"eve"}
     with pytest.raises(InputError, match="give --points 5"):
         exported(

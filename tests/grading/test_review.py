@@ -78,6 +78,8 @@ def test_extensions_and_late_days_move_what_is_lost(extension: float, left: int 
     member = Member("ada", extension_days=extension, late_days=left)
     found = reviewed(late, LATE, member, [])
     assert found.score == pytest.approx(26.0 * (1.0 - 0.1 * lost))
+    excused = reviewed(late, LATE, member, [Entry(Kind.EXCUSE, "ann", "ada")])
+    assert of_review(excused)["late_days_spent"] == 0
 
 
 def test_an_excused_student_has_no_score_and_is_in_no_gradebook(tmp_path: Path) -> None:
@@ -205,6 +207,15 @@ def test_a_grader_error_in_one_attempt_is_no_zero_beside_another(tmp_path: Path)
     ada, ben = best([first, second], tmp_path / "best").grades
     assert (ada.status, ben.status) == (Status.GRADER_ERROR, Status.OK)
     assert ben.notes[-1] == "Points of 2 attempts: 1: 26 (counts), 2: grader error."
+
+
+def test_points_by_hand_for_nothing_handed_in_are_an_attempt(tmp_path: Path) -> None:
+    first = made(tmp_path / "1", grade("ada", Status.MISSING, score(points=0.0)))
+    second = made(tmp_path / "2", grade("ada", Status.OK, score(points=0.0)))
+    (second / "batch.json").write_text((first / "batch.json").read_text())
+    say(first, [points(5.0, comment="shown in the laboratory")])
+    (ada,) = best([first, second], tmp_path / "best").grades
+    assert ada.score == 5.0
 
 
 def test_who_changes_is_told_with_the_reason(tmp_path: Path) -> None:

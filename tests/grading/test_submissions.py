@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.grading.course.class_list import ClassList, Member
 from rds.grading.grade import Status
 from rds.grading.intake import HandedIn, Intake, collect
 from rds.grading.intake.archives import MOST_OWN
@@ -43,8 +44,26 @@ def test_flat_files_and_folders_of_students(tmp_path: Path) -> None:
     assert list(found) == ["ada", "ben", "cy", "dan", "eve"]
     assert [found[name].read() for name in ("ada", "ben", "cy")] == [b"a", b"b", b"c"]
     assert found["dan"].status is found["eve"].status is Status.MISSING
-    assert "notes.txt" in found["dan"].reason
+    assert "notes.txt" in found["dan"].reason and found["dan"].notes == ()
     assert intake.ignored == ("readme.md",)
+
+
+def test_a_student_whose_folder_in_a_zip_holds_clutter_alone_is_missing(tmp_path: Path) -> None:
+    names = ("ada/controller.py", "ben/.DS_Store", "cy/__pycache__/controller.pyc", "__MACOSX/dan/._x", ".git/config")
+    packed = zipped(tmp_path / "all.zip", dict.fromkeys(names, ""))
+    assert {row.student: row.status for row in collect(packed, ACCEPTED).rows} == {
+        "ada": None,
+        "ben": Status.MISSING,
+        "cy": Status.MISSING,
+    }
+
+
+def test_a_late_file_that_ilias_calls_otherwise_is_told_beside_the_one_that_is_graded(tmp_path: Path) -> None:
+    names = ("controller.py", "Late Submission - controller (2).py", "helpers.py")
+    put(tmp_path, {f"ada/{name}": name for name in names})
+    ada = of(tmp_path)["ada"]
+    assert ada.read() == b"controller.py"
+    assert ada.notes == ("controller.py is graded, and not Late Submission - controller (2).py",)
 
 
 def test_nbgrader_s_tree_with_its_time(tmp_path: Path) -> None:
@@ -304,14 +323,67 @@ def test_drafts_in_teams_are_nobody_s(around: str, tmp_path: Path) -> None:
     assert found.ignored == ("Working files",)
 
 
+@pytest.mark.parametrize("title", ["Task", "Task_1"])
+def test_blackboard_s_users_may_have_a_mark_in_their_names_that_titles_have_too(title: str, tmp_path: Path) -> None:
+    users = ("a_l", "b_l", "bob_b", "b", "cy")
+    files = {f"{title}_{user}_attempt_2026-01-09-10-00-00_controller.py": user for user in users}
+    assert {name: row.read().decode() for name, row in of(put(tmp_path, files)).items()} == {u: u for u in users}
+
+
 def test_blackboard_s_users_with_one_ending_are_kept_apart(tmp_path: Path) -> None:
-    files = {f"Task_{user}_attempt_2026-01-09-10-00-00_controller.py": user for user in ("a_l", "b_l", "cy")}
+    names = ("Task_a_l", "Work_b_l", "cy_cy")  # no title that all have
+    files = {f"{name}_attempt_2026-01-09-10-00-00_controller.py": name for name in names}
     found = of(put(tmp_path, files))
     assert {name: row.read().decode() for name, row in found.items()} == {
-        "Task_a_l": "a_l",
-        "Task_b_l": "b_l",
-        "cy": "cy",
+        "Task_a_l": "Task_a_l",
+        "Work_b_l": "Work_b_l",
+        "cy": "cy_cy",
     }
+
+
+ILIAS = {"Lovelace_Ada_x_1234": "ada", "von_der_Heide_Ben_bheide_1235": "ben"}
+
+
+@pytest.mark.parametrize("folders", [ILIAS, dict([*ILIAS.items()][:1])])
+@pytest.mark.parametrize("around", ["Sheet 1/Abgaben/", "Submissions/", ""])
+@pytest.mark.parametrize("is_zipped", [True, False])
+def test_ilias_s_folders_are_known_by_login_and_name(
+    folders: dict[str, str], around: str, is_zipped: bool, tmp_path: Path
+) -> None:
+    files = {f"{around}{folder}/{name}": text for folder, text in folders.items() for name in ("controller.py", "h.py")}
+    place = zipped(tmp_path / "all.zip", dict(files)) if is_zipped else put(tmp_path / "in", files)
+    if is_zipped and not around and len(folders) == 1:
+        place = put(tmp_path / "in", files)  # one folder in a zip may be the class's
+    intake = collect(place, ACCEPTED)
+    assert {row.student: row.read().decode() for row in intake.rows} == folders
+    listed = ClassList((Member("a1", name="Ada Lovelace"), Member("bheide"), Member("cy")))
+    found = [listed.find(row.student, row.source) for row in intake.rows]
+    assert [each.student for each in found if each] == ["a1", "bheide"][: len(folders)]
+
+
+def test_ilias_s_teams_are_found_in_their_folders(tmp_path: Path) -> None:
+    files = {f"Sheet/Abgaben/Team {n}/A_B_ab_{n}/controller.py": str(n) for n in (1, 2)}
+    for count in (1, 2):
+        some = dict([*files.items()][:count])
+        place = put(tmp_path / str(count), some)
+        assert {name: row.read() for name, row in of(place).items()} == {
+            f"Team {n + 1}": b"%d" % (n + 1) for n in range(count)
+        }
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_repositories_of_github_classroom_are_their_students(inside: bool, tmp_path: Path) -> None:
+    files = {
+        "ps1-ada/controller.py": "ada",
+        "ps1-ada/tests/test_x.py": "",
+        "ps1-ada/.git/config": "",
+        "ps1-ben-b/controller.py": "ben",
+    }
+    place = put(tmp_path / "work/ps1-submissions", files)
+    found = of(place if inside else place.parent)
+    assert {name: row.read().decode() for name, row in found.items()} == {"ada": "ada", "ben-b": "ben"}
+    put(place, {"someone/controller.py": "c"})
+    assert list(of(place)) == ["ps1-ada", "ps1-ben-b", "someone"]
 
 
 GRADESCOPE = """---

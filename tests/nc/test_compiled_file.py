@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import os
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +15,11 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.machines import load_machine
-from rds.nc.check import check_program, compiled_if_current, sources
-from rds.nc.compiled_file import MAGIC, open_compiled
+from rds.nc.check import check_program, compiled_if_current, describe, motion, sources
+from rds.nc.compiled_file import _SEAL, MAGIC, open_compiled, write_compiled
 from rds.nc.language.dialect import Dialect
+from rds.nc.path_block import PathBlock
+from rds.nc.run.prepare import compiled_form
 from rds.nc.setup import Setup
 from rds.nc.toolpath import toolpath
 
@@ -98,6 +103,47 @@ def test_it_is_used_only_for_what_it_was_made_of(part: Path, tmp_path: Path, wha
     assert compiled_if_current(part, machine, how) is None
 
 
+def forged(part: Path) -> bytes:
+    """A compiled form that says it is this program's, and is another's: made as anybody can who knows the format."""
+    wanted = describe(part, MACHINE, setup(part))
+    honest = part.read_text(encoding="utf-8")
+    part.write_text(honest.replace("X10 Y20 Z-1", "X10 Y20 Z-9"), encoding="utf-8")
+    blocks = list(open_compiled(compile_it(part)).blocks())
+    part.write_text(honest, encoding="utf-8")
+    stream = io.BytesIO()
+    write_compiled(wanted, blocks, dict)(stream)
+    return stream.getvalue()
+
+
+def lowest(blocks: Iterable[PathBlock]) -> float:
+    return float(min(block.segments["end"][:, 2].min(initial=0.0) for block in blocks))
+
+
+def test_a_forged_one_beside_an_honest_program_is_not_used(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as elsewhere:
+        elsewhere.setenv("XDG_STATE_HOME", str(part.parent / "of_another_user"))
+        data = forged(part)
+    place = part.with_suffix(".dat")
+    place.write_bytes(data)
+    assert lowest(open_compiled(place).blocks()) == -9.0 and not open_compiled(place).is_own
+    assert compiled_if_current(part, MACHINE, setup(part)) is None
+    assert lowest(motion(part, MACHINE, setup(part))) == -1.0  # that is what `rds grade` plans
+    assert (
+        lowest(compiled_form(part, MACHINE, setup(part)).blocks()) == -1.0 and open_compiled(place).is_own
+    )  # made anew
+
+
+def test_a_program_in_a_folder_for_reading_alone_is_compiled_for_as_long_as_it_is_in_use(
+    part: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    form = compiled_form(part, MACHINE, setup(part))
+    assert form.path.parent != part.parent and list(form.blocks()) and not part.with_suffix(".dat").exists()
+    place = form.path.parent
+    del form
+    assert not place.exists()
+
+
 def test_a_file_of_someone_else_is_neither_overwritten_nor_removed(part: Path) -> None:
     data = part.with_suffix(".dat")
     data.write_text("1 2 3\n", encoding="utf-8")
@@ -132,8 +178,9 @@ def test_damage_is_noticed(part: Path, at: float, change: int, cut: bool) -> Non
     place = min(int(at * len(good)), len(good) - 1)
     bad = good[:place] if cut else good[:place] + bytes([good[place] ^ change]) + good[place + 1 :]
     compiled.write_bytes(bad)
-    with pytest.raises(InputError, match=r"compile it again"):
-        open_compiled(compiled)
+    if cut or not -_SEAL - 1 <= place - len(good) < -1:  # else nobody knows who has made it, and it is whole
+        with pytest.raises(InputError, match=r"compile it again"):
+            open_compiled(compiled)
     assert compiled_if_current(part, MACHINE, setup(part)) is None
     compiled.write_bytes(good)
     assert compiled_if_current(part, MACHINE, setup(part)) is not None

@@ -72,7 +72,7 @@ def test_check_of_a_valid_program(folder: Path) -> None:
 
 
 def test_check_of_an_invalid_program(folder: Path) -> None:
-    (folder / "bad.dat").write_bytes(b"RDS compiled part program 1\n")
+    (folder / "bad.dat").write_bytes(b"RDS compiled part program 2\n")
     done = nc("check", "bad.ngc")
     assert done.exit_code == 1
     assert done.stdout.splitlines() == [

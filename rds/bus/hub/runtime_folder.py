@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rds.core.errors import Notice
-from rds.core.private_files import OWN_FOLDER, open_descriptor
+from rds.core.private_files import OWN_FOLDER, open_descriptor, state_folder
 
 LONGEST_PATH = 104  # bytes of a Unix socket's path: 108 on Linux, 104 on macOS, with the final zero
 
@@ -78,9 +78,7 @@ def _in_home() -> Path:
     """The folder to fall back to; another one for each computer, because many may have the same home."""
     from binascii import crc32
 
-    state = os.environ.get("XDG_STATE_HOME", "")
-    base = Path(state) if os.path.isabs(state) else Path(os.path.expanduser("~"), ".local", "state")
-    return base / "rds" / f"run-{crc32(os.uname().nodename.encode()):08x}"  # short: see LONGEST_PATH
+    return state_folder() / f"run-{crc32(os.uname().nodename.encode()):08x}"  # short: see LONGEST_PATH
 
 
 def _taken(directory: Path) -> str | None:

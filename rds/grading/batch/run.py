@@ -30,7 +30,7 @@ from rds.grading.batch.warm_worker import fault_of
 from rds.grading.batch.work import Answer, Task, graded, setup_of
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.course.class_list import ClassList, read_class_list
-from rds.grading.course.groups import by_group
+from rds.grading.course.groups import by_group, with_groups_of_export
 from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Grade, Status
 from rds.grading.intake import Intake, collect
@@ -86,7 +86,9 @@ def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how:
     place = how.class_list or (kept if kept.exists() else None)
     listed = ClassList() if place is None else read_class_list(place)
     _check_sandbox(how)
-    intake = by_group(handed_in(), listed)
+    given = listed
+    intake, listed = with_groups_of_export(handed_in(), given)
+    intake = by_group(intake, listed)
     rows = queued(read, intake, out / STUDENTS, how.jobs if how.scheduler is None else None)
     record = record_of(
         read,
@@ -102,7 +104,7 @@ def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how:
             _check_free(out, how.resume)
             check_same(read_record(out), record, out)
         record.write(out)
-        if listed.members and how.class_list is not None:
+        if listed.members and (how.class_list is not None or listed != given):
             write_whole(kept, listed.to_csv())
         if journal.was_torn:
             how.announce(
@@ -128,18 +130,24 @@ def _unlisted(listed: ClassList, intake: Intake) -> list[str]:
         return []
     groups = listed.groups()
     strangers = [r.student for r in intake.rows if r.student not in groups and listed.find(r.student, r.source) is None]
-    return [f"not in the class list: {student}" for student in strangers]
+    people = [each for row in intake.rows for each in row.source.get("members", ())]  # of groups in Gradescope
+    strangers += [
+        who for each in people if listed.find(who := each["sid"] or each["email"] or each["name"], each) is None
+    ]
+    return [f"not in the class list: {student}" for student in dict.fromkeys(strangers)]
 
 
 def _untimed(assignment: Assignment, intake: Intake) -> list[str]:
     """That lateness costs points, and that nobody knows when some have handed in."""
-    unknown = [row.student for row in intake.rows if row.time is None]
-    if assignment.due is None or assignment.late == LateRules() or not unknown:
+    if assignment.due is None or assignment.late == LateRules():
         return []
-    notes = [
-        f"when they handed in is not known of {len(unknown)} of {len(intake.rows)} submissions, so nothing is deducted "
-        "for lateness there; timestamps.csv (student,timestamp) at the top of the submissions says it"
-    ]
+    handed_in = [row for row in intake.rows if row.status is not Status.MISSING]
+    count, notes = sum(row.time is None for row in handed_in), []
+    if count:
+        notes.append(
+            f"when they handed in is not known of {count} of {len(handed_in)} submissions, so nothing is deducted for "
+            "lateness there; timestamps.csv (student,timestamp) at the top of the submissions says it"
+        )
     for row in intake.rows:
         unread = [note for note in row.notes if row.time is None and note.startswith(NOT_UNDERSTOOD)]
         notes.extend(f"{row.student}: {note}" for note in unread)

@@ -69,12 +69,15 @@ class ClassList:
         about = source or {}
         keys = ("sid", "email") if about.get("platform") == "moodle" else ("sid", "id", "email")
         said = [student, *(str(about[key]) for key in keys if about.get(key))]
-        names = [str(about["name"])] if about.get("name") else [student]
-        return (
-            self._one(said, lambda each: each.student)
-            or self._one(said, lambda each: each.email)
-            or self._one(map(_letters, names), lambda each: _letters(each.name))
-        )
+        found = self._one(said, lambda each: each.student) or self._one(said, lambda each: each.email)
+        by_name = (self._one([_letters(name)], lambda each: _letters(each.name)) for name in _names(student, about))
+        return found or next(filter(None, by_name), None)
+
+    def namesakes(self, student: str, source: Mapping[str, Any]) -> list[Member]:
+        """Several of one name, of whom it may be any who handed in as `student`; none where `find` knows."""
+        names = {_letters(name) for name in _names(student, source)}
+        found = [each for each in self.members if each.name and _letters(each.name) in names]
+        return found if len(found) > 1 and self.find(student, source) is None else []
 
     def _one(self, said: Iterable[str], of: Callable[[Member], str]) -> Member | None:
         wanted = {_compared(text) for text in said if text}
@@ -166,6 +169,13 @@ def _whole(text: str, place: str) -> int:
     if value != int(value):
         raise InputError(f"late_days = {text!r} must be a whole number of days", place)
     return int(value)
+
+
+def _names(student: str, about: Mapping[str, Any]) -> list[str]:
+    """What the student may be called: Moodle puts the group's name and a hyphen before it where groups hand in."""
+    name = str(about.get("name") or student)
+    parts = name.split("-") if about.get("platform") == "moodle" else [name]
+    return ["-".join(parts[at:]) for at in range(len(parts))]
 
 
 def _letters(name: str) -> str:

@@ -45,7 +45,9 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
     heads = [*(sheet.columns[k] for k in kept), sheet.columns[at]]
     # Blackboard asks for quotation marks around every cell between commas, and for none between tabs
     made = Sheet(heads, rows, sheet.has_mark, sheet.form, quotes_all=sheet.form[1] == ",")
-    return Exported({FILE: made.to_bytes()}, unmatched, unknown(sheet, found, "Username"), len(found))
+    excused, _ = find(finished.excused, sheet, _KEYS)
+    notes = unknown(sheet, [*found, *excused], "Username")
+    return Exported({FILE: made.to_bytes()}, unmatched, notes, len(found))
 
 
 def _column(sheet: Sheet, name: str, wanted: ExportOptions) -> int:

@@ -59,7 +59,8 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
     notes: tuple[str, ...] = (
         () if known else (f"the gradebook has no item {item!r}: Brightspace will offer to create it",)
     )
-    notes += unknown(sheet, points, sheet.columns[kept[-1]])
+    excused, _ = find(finished.excused, sheet, _KEYS)
+    notes += unknown(sheet, [*points, *excused], sheet.columns[kept[-1]])
     return Exported({FILE: made.to_bytes()}, unmatched, notes, len(found))
 
 

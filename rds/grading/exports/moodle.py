@@ -50,8 +50,9 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
         row[at] = scaled(grade.score, factor)
         if comments is not None:
             row[comments] = comment(grade).replace(_ESCAPE, "&#92;")
+    excused, _ = find(finished.excused, sheet, KEYS)
     name = "Full name" if sheet.at("Full name") is not None else "Email address"
-    return Exported({FILE: sheet.to_bytes()}, unmatched, unknown(sheet, found, name), len(found))
+    return Exported({FILE: sheet.to_bytes()}, unmatched, unknown(sheet, [*found, *excused], name), len(found))
 
 
 def _column(sheet: Sheet, finished: Finished, wanted: ExportOptions, is_worksheet: bool) -> int:

@@ -14,7 +14,8 @@ from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import CriterionScore, Grade, Status
 
 FILE = "prairielearn"
-_NOT_GRADABLE = (Status.MISSING, Status.REFUSED, Status.FAILED_TO_LOAD, Status.GRADER_ERROR, Status.EXCUSED)
+_NOT_GRADABLE = (Status.MISSING, Status.REFUSED, Status.FAILED_TO_LOAD)
+_NO_SCORE = (Status.GRADER_ERROR, Status.EXCUSED)
 
 
 def export(finished: Finished, wanted: ExportOptions) -> Exported:
@@ -26,10 +27,10 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
 def results(grade: Grade, pictures: Sequence[Picture]) -> dict[str, Any]:
     """What PrairieLearn reads; its score is a share, 0 to 1.
 
-    A file that could not be loaded is not gradable, which costs the student no attempt.
+    A file that could not be loaded is not gradable, which costs the student no attempt; unless a grader gave points.
     """
     said = f"{grade.status}: {one_line(grade.reason, 1000)}"
-    if grade.status in _NOT_GRADABLE:
+    if grade.status in _NO_SCORE or (grade.status in _NOT_GRADABLE and not grade.before_penalty):
         return {"gradable": False, "format_errors": [said], "message": said, "output": printed(grade)}
     share = grade.score / grade.max_score if grade.max_score > 0.0 else 0.0
     return {

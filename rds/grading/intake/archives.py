@@ -62,14 +62,14 @@ def _items(archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo]) -> tuple[li
     seen: set[tuple[str, ...]] = set()
     for entry in sorted(entries, key=lambda entry: entry.filename):
         name, parts = entry.filename.replace("\\", "/"), _parts(entry)
-        if not parts or is_clutter(parts):
+        if not parts or is_clutter(parts[:1]):
             continue
         if _leads_out(name, parts):
             found.append(faulty((name,), "its name leads out of the zip"))
             continue
         if entry.is_dir() or len(parts) > 1:
-            folders.add(parts[0])
-        if entry.is_dir():
+            folders.add(parts[0])  # whatever is in it: it is a student's
+        if entry.is_dir() or is_clutter(parts):
             continue
         if fault := _fault(entry, parts, seen):
             found.append(faulty(parts, fault))

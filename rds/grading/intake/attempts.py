@@ -40,7 +40,7 @@ def of_newest(items: Sequence[Item], notes: list[str]) -> list[Item]:
     """
     every = _by_attempt(items)
     by_attempt = {each: files for each, files in every.items() if any(item.is_handed_in for item in files)}
-    if empty := [shown(name) for name, _ in every if name not in {attempt[0] for attempt in by_attempt}]:
+    if empty := [shown(name) for name, _ in every if name and name not in {attempt[0] for attempt in by_attempt}]:
         notes.append(
             f"there is no .py, .ipynb or .zip in the attempt {', '.join(empty[-5:])}, and so it does not count"
         )

@@ -44,6 +44,9 @@ def chosen(handed: StudentFiles, accepted: Sequence[str]) -> Item:
     if len(found) > 1 and not _are_copies(found):
         names = ", ".join(sorted(shown("/".join(item.parts)) for item in found)[:5])
         raise Refusal(f"{len(found)} files could be meant ({names}); hand in one")
+    if named:  # ILIAS puts words in front of the name of what is late, and people in front of copies
+        ends = tuple(accepted)
+        among = [item for item in candidates if without_number(item.name, accepted)[0].endswith(ends)]
     if len(among) > 1:
         others = ", ".join(sorted(shown("/".join(item.parts)) for item in among if item is not found[0])[:5])
         handed.notes.append(f"{shown('/'.join(found[0].parts))} is graded, and not {others}")

@@ -7,6 +7,8 @@ Task 1_ada_attempt_2026-01-09-10-00-00_controller.py     Blackboard
 111-67890 - Ada Lovelace - Jan 5, 2026 1012 AM/x.py      Brightspace, also without the folder
 Lovelace Ada 101 ada/2026-01-05-10-12-33/controller.py   VPL of Moodle, a folder for each time of handing in
 submission_12345/controller.py, submission_metadata.yml  Gradescope
+Abgaben/Lovelace_Ada_ada_123/controller.py               ILIAS
+ps1-submissions/ps1-ada/controller.py                    GitHub Classroom
 ada/controller.py, ada.py                                a folder, or a file, of each student
 """
 
@@ -18,19 +20,15 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
-from rds.grading.intake.attempts import dashed_time, is_dated, is_version
+from rds.grading.intake.attempts import dashed_time, is_dated
 from rds.grading.intake.gradescope import METADATA, Submitter, read_metadata
 from rds.grading.intake.items import Item
-from rds.grading.intake.names import shown, without_number
+from rds.grading.intake.names import shown
 from rds.grading.intake.nbgrader import STAMP, assignment_in, is_nbgrader
+from rds.grading.intake.outer_folders import DRAFTS, ILIAS_FOLDER, is_part, of_classroom, without_root
 
 TIMES = "timestamps.csv"  # of the instructor, at the top
 NOT_UNDERSTOOD = "the time at which it was handed in cannot be understood"  # begins a note
-# folders in which one student keeps parts of a submission
-_PARTS = frozenset(
-    {"code", "data", "doc", "docs", "lib", "notebooks", "old", "python", "source", "src", "test", "tests"}
-)
-_HANDED_IN, _DRAFTS = "Submitted files", "Working files"  # side by side in Teams
 
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL)
 # students choose their names there, and files', and Moodle puts the number behind the name: of a folder the last counts
@@ -79,16 +77,18 @@ def sorted_out(
     assignments: Sequence[str],
     zipped: bool,
     accepted: Sequence[str] = (),
+    place: str = "",
 ) -> Layout:
     """The files by student. `assignments` are names by which nbgrader may know the assignment.
 
     `zipped`: whether they are in an export, whose times are the learning platform's. `accepted`: the names that a
-    submission should have. InputError if there are several assignments and none has such a name.
+    submission should have. `place` is what the folder, or the zip, is called in which all of them lie. InputError if
+    there are several assignments and none has such a name.
     """
     outermost, count = list(folders), len(items)
-    items, folders = _without_root(items, folders, zipped, accepted)
+    items, folders, around = without_root(items, folders, zipped, accepted, _is_one_s_name)
     times = next((item for item in items if item.parts == (TIMES,)), None)
-    sorting = _Sorting(zipped, ignored=[_DRAFTS] if len(items) < count else [])
+    sorting = _Sorting(zipped, ignored=[DRAFTS] if len(items) < count else [])
     items = [item for item in items if item is not times]
     metadata = next((item for item in items if item.parts == (METADATA,)), None)
     if metadata is not None:
@@ -130,10 +130,13 @@ def sorted_out(
         for student in folders:
             sorting.files_of(student)
         return sorting.layout("nbgrader", times)
+    prefix = of_classroom(folders, around or place)
     for item in items:
-        sorting.plain(item)
-    for student in folders:
-        sorting.files_of(student)
+        own = replace(item, parts=(item.parts[0].removeprefix(prefix), *item.parts[1:])) if prefix else item
+        sorting.plain(own)
+    for folder in folders:
+        sorting.files_of(folder.removeprefix(prefix))
+    sorting.ilias(folders)
     sorting.doubt(folders, is_cut=zipped and len(folders) == 2 and folders != outermost)
     return sorting.layout("folders and files", times)
 
@@ -174,10 +177,19 @@ class _Sorting:
         else:
             self._ignored.append(shown(item.name))
 
+    def ilias(self, folders: Sequence[str]) -> None:
+        """What ILIAS says in the names of its folders: who it is, for the class list and the gradebook."""
+        found = {folder: match for folder in folders if (match := ILIAS_FOLDER.fullmatch(folder))}
+        if 2 * len(found) > len(folders):
+            for folder, match in found.items():
+                last, _, first = match["names"].partition("_")
+                name = "" if "_" in first else f"{first} {last}"  # else it is not known where the last name ends
+                self.files_of(folder).source.update(platform="ilias", name=shown(name), sid=shown(match["login"]))
+
     def doubt(self, folders: Sequence[str], is_cut: bool) -> None:
         """Tell with whom a folder may be no student, but a part of one's submission."""
         for folder in folders:
-            if is_cut or _is_part(folder):
+            if is_cut or is_part(folder):
                 said = "is taken for a student; if the folder is a part of a student's submission, put all of that into"
                 self.files_of(folder).notes.append(f"{shown(folder)} {said} one folder with the student's name")
 
@@ -244,12 +256,19 @@ class _Sorting:
         for match in found:
             if match is not None:
                 users.setdefault(match["user"], set()).add(match["before"])
+        befores = sorted(set().union(*users.values()))
+        # what all names begin with is the assignment's title; a user's name may hold a `_` as well
+        begins = [befores[0][:at] for at in range(len(befores[0]), 0, -1)] if len(befores) > 1 else []
+        fits = (each for each in begins if each.endswith("_") and all(name.startswith(each) for name in befores))
+        title = next(fits, "")
         for item, match in zip(items, found, strict=True):
             if match is None:
                 self.plain(item)
                 continue
-            alone = len(users[match["user"]]) == 1  # else names with _ in them end alike
-            handed = self.files_of(match["user"] if alone else match["before"], platform="blackboard")
+            user = match["before"].removeprefix(title) if title else match["user"]
+            if not title and len(users[user]) > 1:  # names with _ in them end alike
+                user = match["before"]
+            handed = self.files_of(user, platform="blackboard")
             handed.has_times = True
             if match["file"]:
                 when = dashed_time(match["time"])
@@ -345,47 +364,9 @@ def _brightspace_time(said: str) -> datetime | None:
     return None
 
 
-def _without_root(
-    items: Sequence[Item], folders: Sequence[str], zipped: bool, accepted: Sequence[str]
-) -> tuple[list[Item], list[str]]:
-    """Without the one folder around everything that exports and courses have, or who packs a folder into a zip."""
-    if {*folders} == {_DRAFTS, _HANDED_IN}:
-        items, folders = [item for item in items if item.parts[0] != _DRAFTS], [_HANDED_IN]
-    while len(folders) == 1 and all(len(item.parts) > 1 for item in items if item.is_handed_in):
-        known = re.fullmatch(r"assignment_\d+_export|submitted|submissions|Student Work|Submitted files", folders[0])
-        is_one_s = any(each.fullmatch(folders[0]) for each in (_MOODLE_FOLDER, _BRIGHTSPACE)) or any(
-            item.parts == (METADATA,) for item in items
-        )
-        if not known and (is_one_s or not zipped or not _is_of_a_class(items, accepted)):
-            break
-        items = [replace(item, parts=item.parts[1:]) if len(item.parts) > 1 else item for item in items]
-        folders = sorted({item.parts[0] for item in items if len(item.parts) > 1})
-        if {*folders} == {_DRAFTS, _HANDED_IN}:
-            return _without_root(items, folders, zipped, accepted)
-    return list(items), list(folders)
-
-
-def _is_of_a_class(items: Sequence[Item], accepted: Sequence[str]) -> bool:
-    """Whether what lies in one folder is several students': in a folder, or a file, of each of them."""
-    handed_in = [item for item in items if item.is_handed_in]
-    if len(handed_in) < 2:
-        return False
-    at = 1  # of the first folder, or file, that they do not share
-    while len({item.parts[:at] for item in handed_in}) == 1 and all(len(item.parts) > at for item in handed_in):
-        at += 1
-    alone = [item.name for item in handed_in if len(item.parts) == at]
-    in_folders = {item.parts[at - 1] for item in handed_in if len(item.parts) > at}
-    is_one_s = any(without_number(name, accepted)[0] in accepted for name in alone)
-    is_one_s |= bool(in_folders) and not alone and all(map(_is_part, in_folders))
-    around = handed_in[0].parts[: at - 1]  # what the only one to hand in has in it says nothing of others
-    is_one_s |= any(is_version(folder) or is_dated(folder) for folder in around)
-    is_one_s |= any(item.name == STAMP and item.parts[:-1] == around[: len(item.parts) - 1] for item in items)
-    return not is_one_s and (len(in_folders) > 1 or len(alone) > 1)
-
-
-def _is_part(folder: str) -> bool:
-    """Whether a folder is called as one inside a submission is."""
-    return is_version(folder) or is_dated(folder) or folder.lower() in _PARTS
+def _is_one_s_name(folder: str) -> bool:
+    """Whether Moodle or Brightspace calls the folder of a student so."""
+    return any(each.fullmatch(folder) for each in (_MOODLE_FOLDER, _BRIGHTSPACE))
 
 
 def _mostly(items: Sequence[Item], fits: Any) -> bool:

@@ -80,7 +80,7 @@ def collect(
         items, folders, zipped = [_single(path)], [], False
     else:
         raise InputError("is no folder, no .zip and no submission; name where the submissions are", str(path))
-    layout = sorted_out(items, folders, assignments, zipped, accepted)
+    layout = sorted_out(items, folders, assignments, zipped, accepted, path.resolve().stem)
     if not layout.by_student:
         raise InputError("holds no submissions: no .py, no .ipynb and no folder of a student", str(path))
     listed = listed_times(layout, zone)

@@ -64,6 +64,7 @@ def reviewed(grade: Grade, late: LateRules, member: Member | None, entries: Sequ
     )
     excuses = [each for each in entries if each.kind is Kind.EXCUSE]
     if excuses:
+        said["late_days_spent"] = 0  # it counts neither for nor against the student
         return replace(made, status=Status.EXCUSED, reason=excuses[-1].comment or "excused by a grader", score=0.0)
     return made
 

@@ -56,11 +56,12 @@ def best(batches: Sequence[Path], out: Path) -> Finished:
 def _best(finished: Sequence[Finished], student: str) -> tuple[int, Grade]:
     """The number of the batch, and the grade in it. A grader error is no attempt if there is another one.
 
-    To have handed in nothing is none at all: beside it a grader error stands, and is no zero.
+    To have handed in nothing is none at all, unless a grader has given points for it: beside it a grader error stands,
+    and is no zero.
     """
     found = [(n, grade) for n, each in enumerate(finished) for grade in each.grades if grade.student == student]
     rank = {Status.GRADER_ERROR: 1, Status.MISSING: 2}
-    return min(found, key=lambda pair: (rank.get(pair[1].status, 0), -pair[1].score, pair[0]))
+    return min(found, key=lambda pair: (0 if pair[1].score else rank.get(pair[1].status, 0), -pair[1].score, pair[0]))
 
 
 def _note(finished: Sequence[Finished], student: str, number: int) -> str:

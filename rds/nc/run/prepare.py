@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 
@@ -22,7 +25,7 @@ from rds.machines import Machine
 from rds.machines.kinematics.tip import Tip
 from rds.modes.loop.program import InterpolatedProgram, Program, ProgramEvent
 from rds.nc.check import check_program, compiled_if_current
-from rds.nc.compiled_file import Compiled, open_compiled
+from rds.nc.compiled_file import Compiled, beside, open_compiled
 from rds.nc.configuration import configured
 from rds.nc.path_block import Event, PathBlock
 from rds.nc.run.in_part import from_line, stepwise
@@ -106,13 +109,21 @@ def prepare(
 
 
 def compiled_form(file: Path, machine: Machine, setup: Setup, progress: Progress | None = None) -> Compiled:
-    """The current compiled form beside the program in `file`, made if there is none; errors as those of `prepare`."""
+    """The current compiled form beside the program in `file`, made if there is none; errors as those of `prepare`.
+
+    In a folder that cannot be written to, as that of a course, it is made for as long as it is in use.
+    """
     compiled = compiled_if_current(file, machine, setup)
-    if compiled is None:
-        validation, place = check_program(file, machine, setup, progress)
-        if place is None:
-            raise InputError(str(validation))
-        compiled = open_compiled(place)
+    if compiled is not None:
+        return compiled
+    folder = None if os.access(file.parent, os.W_OK) else TemporaryDirectory(prefix="rds-compiled-")
+    wanted = None if folder is None else Path(folder.name) / beside(file).name
+    validation, place = check_program(file, machine, setup, progress, wanted)
+    if place is None:
+        raise InputError(str(validation))
+    compiled = open_compiled(place)
+    if folder is not None:
+        finalize(compiled, folder.cleanup)
     return compiled
 
 

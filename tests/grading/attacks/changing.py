@@ -114,4 +114,36 @@ ATTACKS = {
         "class State:\n    def __del__(self): os._exit(0)\nState()", KILLED, "exit code 0"
     ),
     "a module that is another": Attack("import sys\nsys.modules[__name__] = None\ndef __getattr__(name): 1 / 0"),
+    "the code of our loop exchanged": Attack(
+        "import sys\ndef other(*a): return None\nruns = sys.modules['rds.grading.sandbox.inside.runs']\nfor value in list(vars(runs).values()):\n    try: value.__code__ = other.__code__\n    except (AttributeError, ValueError): pass",
+        TIMED_OUT,
+        "no answer",
+    ),
+    "another struct in our modules": Attack(
+        "import sys\nclass S:\n    size = 24\n    def __init__(self, *a): pass\n    def pack(self, *a): return b'\\xff' * 24\n    def unpack(self, data): return (0,) * 9\nfor module in list(sys.modules.values()):\n    if getattr(module, '__name__', '').startswith('rds') and hasattr(module, 'struct'): module.struct = type('M', (), {'Struct': S})",
+        KILLED,
+        "exit code 1",
+    ),
+    "a write of one byte at a time": Attack(
+        "import os\nwrite = os.write\nos.write = lambda to, data: write(to, data[:1])"
+    ),
+    "a read of nothing": Attack("import os\nos.read = lambda of, count: bytes(count)", KILLED, "exit code 1"),
+    "a check of numbers that says yes": Attack(
+        "import sys\nfor module in list(sys.modules.values()):\n    if hasattr(module, 'isfinite'): vars(module)['isfinite'] = lambda value: True\n    if hasattr(module, 'as_voltage'): module.as_voltage = lambda *a, **k: float('nan')",
+        CONTRACT,
+        "not finite",
+    ),
+    "the mailbox made larger": Attack(
+        _ENDS
+        + "for grow in (lambda: os.ftruncate(memory, 1 << 20), lambda: os.posix_fallocate(memory, 0, 1 << 22)):\n    try: grow()\n    except OSError: continue\n    raise SystemExit('grown')"
+    ),
+    "a hole in the mailbox": at_the_sixth(
+        "ctypes.CDLL(None).fallocate(memory, 3, ctypes.c_long(0), ctypes.c_long(4096))"
+    ),
+    "a call that is pending in our loop": ends(
+        "made = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)(lambda _: -1)\nsys.kept = made\nctypes.pythonapi.Py_AddPendingCall(made, None)",
+        CONTRACT,
+        "SystemError",
+    ),
+    "an interpreter that is finalized": ends("ctypes.pythonapi.Py_Finalize()", KILLED, "SIGSEGV|SIGABRT|exit code"),
 }

@@ -128,4 +128,13 @@ ATTACKS = {
     "a null byte": Attack("x = 1\0", LOAD, "null"),
     "a nesting that no parser takes": Attack("x = " + "(" * 5000 + ")" * 5000, LOAD, ""),
     "another encoding": Attack("# coding: utf-7\nx = '+AAo-'"),
+    "a pickle that numpy loads": Attack(
+        "import io, os\nimport numpy as np\nclass P:\n    def __reduce__(self): return os._exit, (0,)\nkept = io.BytesIO()\nnp.save(kept, np.array([P()], object), allow_pickle=True)\nkept.seek(0)\nnp.load(kept, allow_pickle=True)",
+        Status.KILLED,
+        "exit code 0",
+    ),
+    "voltages and params that are pickled as something else": Attack(
+        "import os\nclass V(float):\n    def __reduce_ex__(self, protocol): return os._exit, (0,)\nclass P(dict):\n    __class__ = dict\n    __reduce_ex__ = V.__reduce_ex__\n    def __deepcopy__(self, memo): os._exit(3)\nparams = P(a=1.0)\ndef control(t, r, y, state, params):\n    return V(1.0), V(2.0)\n"
+    ),
+    "a text that no parser can nest": Attack("x = " + "-" * 100_000 + "1", LOAD, "MemoryError|RecursionError|nested"),
 }
