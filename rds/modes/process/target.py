@@ -32,7 +32,7 @@ from rds.modes.loop.stopwatch import Stopwatch, quiet_memory
 from rds.modes.process.blame import fault
 from rds.modes.process.environment import describe_environment, prepare, stolen_ticks
 from rds.modes.process.record import write_whole
-from rds.modes.process.recorder import ASK_WHERE, PLAN, READY, REPORT, TRACE
+from rds.modes.process.recorder import ASK_WHERE, CLOSING, PLAN, READY, REPORT, TRACE
 from rds.modes.process.ring import Ring
 
 log = logging.getLogger(__name__)
@@ -55,11 +55,15 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
     faults, dialect = bus.pop("faults", ()), bus.pop("dialect", DEFAULT)
     threads = threading.active_count()
     stack = ExitStack()
+
+    def homing(axis: str, position: float) -> None:
+        ring.beat(1 - ring.heartbeat)  # it goes on
+
     try:
         if bus["interface"] == "rds":
             stack.enter_context(Command(bus["channel"]))
         drivers = open_drivers(dialect, plan.machine, plan.names, plan.T, mode.drivers == "dry run", bus)
-        drivers.start()
+        drivers.start(homing)
         if bus["interface"] == "rds":
             watch = stack.enter_context(RunWatch(bus["channel"], faults))
         ring.beat(1)
@@ -92,6 +96,7 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
             log.exception("the run ended by an exception")
         report["reason"] = fault(plan, error, loop.k if loop else None)
     finally:
+        ring.beat(CLOSING)
         environment["threads"] = threading.active_count() - threads  # that the student's code left running
         if drivers is not None:
             report["drivers"] = {name: n - counted.get(name, 0) for name, n in asdict(drivers.counters).items()}
