@@ -11,7 +11,7 @@ too old, or of a second host (freshness.py), is refused and not answered. Number
 been set up, so one that was exchanged or has restarted stands still. The emergency stop is latched until it is reset.
 
 By methods A, B and C the module closes its position loop itself (node_motion.py). While it does, it takes no voltages;
-while a host commands voltages, it begins no such motion.
+while a host commands voltages or a motion has set points left, it begins no such motion.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ class AxisModule:
         if len(data) < 2 or data[1] not in (0, self.node):
             return None
         self.by_itself.expire(at)
-        if data[0] == Verb.BEGIN and self._expires is not None:
+        if data[0] in (Verb.BEGIN, Verb.GAIN) and (self._expires is not None or self.by_itself.moves):
             self._refuse("a motion", Verdict.STRANGE.value, at)
             return None
         try:
