@@ -56,6 +56,16 @@ def test_by_itself_it_gives_up_to_the_range_of_the_converter(volts: float) -> No
     assert module.motion.voltage == volts
 
 
+@pytest.mark.parametrize("gain", [float("nan"), float("inf")])
+def test_a_gain_that_is_no_number_gives_no_voltage(gain: float) -> None:
+    module = make()
+    module.control(motion_frames.encode_gain(2, motion_frames.Gain.VELOCITY, gain), 100.0)
+    module.control(motion_frames.encode_begin(2, motion_frames.Buffer.NONE, 0), 100.0)
+    module.receive(motion_frames.SETPOINTS, motion_frames.encode_setpoints([16]), 100.0)
+    module.motion.advance(100.001)
+    assert module.motion.voltage == 0.0 and not module.by_itself.active
+
+
 @pytest.mark.parametrize("data", [b"", b"\x02", b"\x02\x00"])
 def test_a_piece_of_a_buffer_without_bytes_changes_nothing(data: bytes) -> None:
     module = make()

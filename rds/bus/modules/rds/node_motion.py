@@ -208,15 +208,15 @@ class NodeMotion:
         if self.gauge is not None:
             self.gauge.append((at, true))
         error = 0 if self._turns else self._position - round(true / self._resolution)
-        if abs(error) > FAR:
-            LOG.warning("module %s: %g counts from its set point, zero volts", self.name, error)
-            self.stop(at, MotionStatus.FAR)
-            return
         proportional, velocity, forward, backward, integral = self._gains
         speed = (target - self._position) / self._period
         friction = forward if speed > 0.0 else backward if speed < 0.0 else 0.0
         total = self._sum + error * self._period
         voltage = proportional * error + integral * total + velocity * speed + friction
+        if not (abs(error) <= FAR and abs(voltage) < inf):  # nor what a gain or a set point makes that is no number
+            LOG.warning("module %s: %g counts from its set point, zero volts", self.name, error)
+            self.stop(at, MotionStatus.FAR)
+            return
         if abs(voltage) <= self._highest:
             self._sum = total
         self._axis.command(max(-self._highest, min(self._highest, voltage)), at)
