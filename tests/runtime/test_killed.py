@@ -192,8 +192,13 @@ def test_a_loop_that_has_ended_has_time_to_brake(
     assert "had not let go of the machine" in hung[1] and "control()" not in hung[1]
 
 
-def test_homing_may_last(recorded: tuple[subprocess.Popen[bytes], Recorder], monkeypatch: pytest.MonkeyPatch) -> None:
-    """It has a time of its own, which may be longer than that of all the rest."""
+@pytest.mark.parametrize(
+    "stop, ending", [(False, ("machine lost", "lost")), (True, ("stopped", "stopped while X"))]
+)
+def test_homing_may_last_and_be_stopped(
+    recorded: tuple[subprocess.Popen[bytes], Recorder], monkeypatch: pytest.MonkeyPatch, stop: bool, ending: Any
+) -> None:
+    """It has a time of its own, longer than that of all the rest: a stop was heard only when it was over."""
     ring, beats = recorded[1].ring, []
     ring.beat(0)
 
@@ -201,6 +206,9 @@ def test_homing_may_last(recorded: tuple[subprocess.Popen[bytes], Recorder], mon
         for place in range(3):
             homing("X", place)
             beats.append(ring.heartbeat)
+        if stop:
+            ring.ask_to_stop()
+            homing("X", 3.0)
         raise rds.MachineError("lost")
 
     drivers = SimpleNamespace(start=start, close=lambda: None, counters=Counters())
@@ -208,7 +216,8 @@ def test_homing_may_last(recorded: tuple[subprocess.Popen[bytes], Recorder], mon
     monkeypatch.setattr("rds.bus.modules.dialects.open_drivers", lambda *_: drivers)
     plan: Any = SimpleNamespace(mode="implementation", T=0.001, late=None, priority=0, cpu=None, machine=None, names=[])
     plan.bus = {"interface": "virtual"}
-    assert target.run(plan, ring, LiveValues.open(ring.live_values_path))["reason"] == "lost"
+    report = target.run(plan, ring, LiveValues.open(ring.live_values_path))
+    assert report["ending"] == ending[0] and report["reason"].startswith(ending[1])
     assert len(set(beats[:2])) == 2 and max(beats) < READY
     assert ring.heartbeat == CLOSING
 

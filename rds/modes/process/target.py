@@ -26,6 +26,7 @@ from rds.core.errors import AdapterError, MachineError, RdsError
 from rds.core.private_files import keep_process_private, open_private
 from rds.core.types import Ending
 from rds.modes import load_mode
+from rds.modes.loop.changes import STOP
 from rds.modes.loop.live_values import LiveValues
 from rds.modes.loop.plan import Plan, load
 from rds.modes.loop.stopwatch import Stopwatch, quiet_memory
@@ -36,6 +37,10 @@ from rds.modes.process.recorder import ASK_WHERE, CLOSING, PLAN, READY, REPORT, 
 from rds.modes.process.ring import Ring
 
 log = logging.getLogger(__name__)
+
+
+class _Stopped(Exception):
+    """Somebody wants the end before the first sample."""
 
 
 def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
@@ -58,6 +63,8 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
 
     def homing(axis: str, position: float) -> None:
         ring.beat(1 - ring.heartbeat)  # it goes on
+        if ring.stop_asked() or live_values.values().get(STOP):
+            raise _Stopped(f"stopped while {axis} was homed; it has no power, and is to be homed again")
 
     try:
         if bus["interface"] == "rds":
@@ -88,6 +95,8 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
         report["reason"] = loop.changes.reason
         if report["ending"] is Ending.DONE:
             drivers.confirm()
+    except _Stopped as stopped:
+        report |= {"ending": Ending.STOPPED, "reason": str(stopped)}
     except MachineError as error:
         ending = Ending.ADAPTER_LOST if isinstance(error, AdapterError) else Ending.MACHINE_LOST
         report |= {"ending": ending, "reason": str(error)}
