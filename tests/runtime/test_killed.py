@@ -192,9 +192,7 @@ def test_a_loop_that_has_ended_has_time_to_brake(
     assert "had not let go of the machine" in hung[1] and "control()" not in hung[1]
 
 
-@pytest.mark.parametrize(
-    "stop, ending", [(False, ("machine lost", "lost")), (True, ("stopped", "stopped while X"))]
-)
+@pytest.mark.parametrize("stop, ending", [(False, ("machine lost", "lost")), (True, ("stopped", "stopped while X"))])
 def test_homing_may_last_and_be_stopped(
     recorded: tuple[subprocess.Popen[bytes], Recorder], monkeypatch: pytest.MonkeyPatch, stop: bool, ending: Any
 ) -> None:

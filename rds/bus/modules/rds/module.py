@@ -233,8 +233,8 @@ class AxisModule:
         counts = self._counts(at)
         self.ticks += 1
         self.status = status
-        if voltage is not None or self.emergency:
-            self.motion.command(0.0 if self.emergency else self._scale * (voltage or 0.0), at)
+        if voltage is not None and not self.emergency:  # which has cut it, and what an amplifier adds to zero volts
+            self.motion.command(self._scale * voltage, at)
             self._cuts = at + OLDEST * self._period
         self._expires = at + WATCHDOG_PERIODS * self._period
         return frames.encode_answer(Answer(counts, self._whole_status(at), Kind.ANSWER, self.ticks))
