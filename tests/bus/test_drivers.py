@@ -307,12 +307,24 @@ class Wired(Puppet):
             self.inbox += [can.Message(arbitration_id=0x22, data=data, is_extended_id=False) for data in answers]
 
 
-def test_a_set_up_that_was_lost_is_sent_again() -> None:
+@pytest.mark.parametrize("earlier", [None, 0.001])
+def test_a_set_up_that_was_lost_is_sent_again(earlier: float | None) -> None:
+    """With the period of an earlier host it answered, took no command, and its axis stood still: nobody was told."""
     with Wired() as bus:
+        if earlier:
+            bus.module.receive(frames.SETUP, frames.encode_setup(earlier), time.monotonic())
         drivers = AxisDrivers(SLOW, ["X"], bus=bus)
         drivers.start()
         drivers.exchange()
-        assert bus.set_ups == 2
+        assert bus.set_ups == 2 and bus.module.status == Status.ENABLED
+
+
+def test_a_module_that_takes_no_command_is_told() -> None:
+    with Wired() as bus:
+        bus.set_ups = -10
+        bus.module.receive(frames.SETUP, frames.encode_setup(0.001), time.monotonic())
+        with pytest.raises(MachineError, match=r"X \(node 2\) .* answers, and takes no command of a sample period"):
+            AxisDrivers(SLOW, ["X"], bus=bus).start()
 
 
 class Moving(Puppet):
