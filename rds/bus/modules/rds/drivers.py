@@ -35,6 +35,7 @@ SILENT_AFTER = 10  # periods in a row without an answer; then all axes get zero 
 LOST_AFTER = 0.1  # s without an answer, and SILENT_AFTER periods at least: the run ends. Computers stall for less
 _STARTING = 1.0  # s for all modules to answer at the start
 _SET_UP_AGAIN = 20  # ticks at the start, a quarter of it at most, until a module that was not set up is so again
+_SET_UPS = 3  # at the start: a frame may be lost, and a module that has a set-up already does not tell
 _IGNORED = 10  # commands in a row: the first one after a silence is not taken
 _SET_UP_TRIES, _SET_UP_TICKS = 3, 5  # for a module that takes no commands, though it answers
 _RELEASE = "release its button, then `rds estop --reset`, or Release at the top of the page"
@@ -174,6 +175,9 @@ class AxisDrivers(CanDrivers[_Module]):
                 if isinstance(error.__cause__, can.CanTimeoutError):  # with bit timing: nobody acknowledges the ticks
                     raise self._silent([module for module in self._modules if not module.seen]) from error
                 raise
+        for _ in range(_SET_UPS - 1):  # by that of an earlier host, a module might cut the voltage too late
+            self._send(frames.SETUP, self._setup)
+            self.exchange()
 
     def _wait_for_standstill(self) -> None:
         """As DriversBase. One that did not get the set-up, and has one of an earlier host, gets it now."""
