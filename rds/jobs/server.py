@@ -10,6 +10,7 @@ import asyncio
 import hmac
 import json
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any
 
@@ -40,6 +41,7 @@ class Server:
         """Until SIGINT, SIGTERM or the end of its terminal (SIGHUP, but under nohup); then what runs is stopped."""
         stop = asyncio.Event()
         loop = asyncio.get_running_loop()
+        self.use_threads(loop)
         for number in ending_signals():
             with suppress(NotImplementedError):  # Windows: Ctrl-C ends asyncio.run
                 loop.add_signal_handler(number, stop.set)
@@ -51,6 +53,10 @@ class Server:
             await asyncio.to_thread(self._jobs.close)
             for writer in [*self._clients, *self._strangers]:
                 writer.close()
+
+    def use_threads(self, loop: asyncio.AbstractEventLoop) -> None:
+        """One for each that may ask, and for the end: no stop waits until the files of others are read."""
+        loop.set_default_executor(ThreadPoolExecutor(CLIENTS * (1 + WATCHES) + 1, "request"))
 
     async def _meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._strangers) >= CLIENTS:

@@ -293,26 +293,40 @@ def test_other_frames_are_ignored_and_counted(puppet: tuple[Puppet, AxisDrivers]
 
 
 class Wired(Puppet):
-    """A bus with the module of axis X, which does not get the first set-up."""
+    """A bus with the module of axis X, which does not get the first set-ups."""
 
-    def __init__(self) -> None:
+    def __init__(self, lost: int = 1) -> None:
         super().__init__()
+        self.lost = lost
         self.module = AxisModule(SLOW.axis("X"), 0, SLOW.sample_period, time.monotonic())
         self.set_ups = 0
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         self.set_ups += msg.arbitration_id == frames.SETUP
-        if msg.arbitration_id != frames.SETUP or self.set_ups > 1:
+        if msg.arbitration_id != frames.SETUP or self.set_ups > self.lost:
             answers = self.module.receive(msg.arbitration_id, msg.data, time.monotonic())
             self.inbox += [can.Message(arbitration_id=0x22, data=data, is_extended_id=False) for data in answers]
 
 
-def test_a_set_up_that_was_lost_is_sent_again() -> None:
-    with Wired() as bus:
+@pytest.mark.parametrize("lost, earlier", [(1, None), (1, 0.001), (1, 0.1), (3, 0.001)])
+def test_a_set_up_that_was_lost_is_sent_again(lost: int, earlier: float | None) -> None:
+    """With a shorter period of an earlier host it answered, took no command, and its axis stood still: nobody was told.
+    With a longer one its voltage lasted too long.
+    """
+    with Wired(lost) as bus:
+        if earlier:
+            bus.module.receive(frames.SETUP, frames.encode_setup(earlier), time.monotonic())
         drivers = AxisDrivers(SLOW, ["X"], bus=bus)
         drivers.start()
         drivers.exchange()
-        assert bus.set_ups == 2
+        assert bus.module.status == Status.ENABLED and bus.module._period == SLOW.sample_period
+
+
+def test_a_module_that_takes_no_command_is_told() -> None:
+    with Wired(lost=100) as bus:
+        bus.module.receive(frames.SETUP, frames.encode_setup(0.001), time.monotonic())
+        with pytest.raises(MachineError, match=r"X \(node 2\) .* answers, and takes no command of a sample period"):
+            AxisDrivers(SLOW, ["X"], bus=bus).start()
 
 
 class Moving(Puppet):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import exp
 
 import pytest
@@ -54,6 +55,24 @@ def test_by_itself_it_gives_up_to_the_range_of_the_converter(volts: float) -> No
     module.receive(motion_frames.SETPOINTS, motion_frames.encode_setpoints([16]), 0.0)
     module.motion.advance(0.001)
     assert module.motion.voltage == volts
+
+
+def test_in_an_emergency_stop_no_offset_of_the_amplifier_moves_the_axis() -> None:
+    module = AxisModule(replace(AXIS, machine={**AXIS.machine, "offset": 0.5}), 0, T, start=100.0)
+    module.receive(frames.GENERAL, frames.EMERGENCY, 100.0)
+    for k in range(100):  # of a host that goes on
+        module.receive(frames.COMMAND, command(5.0), 100.0 + k * T)
+    assert module.motion.advance(100.2) == 0.0
+
+
+@pytest.mark.parametrize("gain", [float("nan"), float("inf")])
+def test_a_gain_that_is_no_number_gives_no_voltage(gain: float) -> None:
+    module = make()
+    module.control(motion_frames.encode_gain(2, motion_frames.Gain.VELOCITY, gain), 100.0)
+    module.control(motion_frames.encode_begin(2, motion_frames.Buffer.NONE, 0), 100.0)
+    module.receive(motion_frames.SETPOINTS, motion_frames.encode_setpoints([16]), 100.0)
+    module.motion.advance(100.001)
+    assert module.motion.voltage == 0.0 and not module.by_itself.active
 
 
 @pytest.mark.parametrize("data", [b"", b"\x02", b"\x02\x00"])

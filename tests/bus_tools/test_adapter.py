@@ -301,6 +301,18 @@ def test_bus_time_is_that_of_the_stamps_however_late_frames_are_taken(monkeypatc
     assert [clock.at(1.7e9 + later) - at for later in (0.25, 4.5)] == [0.25, 4.5]
 
 
+def test_bus_time_goes_on_when_the_clock_of_the_stamps_is_set_back_in_a_silence(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It stood for as long as nothing had come, and so did the axes of simulated modules."""
+    local = SimpleNamespace(time=lambda: 1.7e9, monotonic=lambda: 0.0)
+    monkeypatch.setattr("rds.bus.modules.bus_node.time", local)
+    clock = BusTime()
+    clock.at(1.7e9)
+    local.monotonic = lambda: 60.0
+    assert [clock.at(1.7e9 - 3540.0 + later) - 1.7e9 for later in (0.0, 0.25)] == [60.0, 60.25]
+
+
 def test_own_frames_that_an_interface_gives_back_are_dropped() -> None:
     group = f"ff15::{uuid4().hex[:4]}"
     options = {"port": 43000 + os.getpid() % 1000, "beyond_this_computer": True}

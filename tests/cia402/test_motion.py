@@ -219,6 +219,23 @@ def test_disabling_operation_brakes_first(rig: Rig) -> None:
     assert rig.state() is State.SWITCHED_ON and rig.voltage == 0.0
 
 
+@pytest.mark.parametrize("fault, state", [(False, State.SWITCH_ON_DISABLED), (True, State.FAULT)])
+def test_a_stop_while_operation_is_disabled_is_not_taken_back(rig: Rig, fault: bool, state: State) -> None:
+    rig.write(0x605E, 2, 2)
+    rig.nmt(1)
+    rig.enable(Mode.PROFILE_VELOCITY)
+    rig.write(0x60FF, 8000, 4)
+    rig.wait(0.4)
+    rig.write(0x6040, SWITCH_ON, 2)
+    if fault:
+        rig.keep(rig.drive.fault(0x4310, rig.t))
+    else:
+        rig.write(0x6040, QUICK_STOP, 2)
+    rig.write(0x6040, ENABLE_OPERATION, 2)
+    rig.wait(0.3)
+    assert rig.drive.state is state and rig.voltage == 0.0
+
+
 @pytest.mark.parametrize("word, state", [(DISABLE_VOLTAGE, State.SWITCH_ON_DISABLED), (SHUTDOWN, State.READY)])
 def test_without_power_there_is_no_voltage(rig: Rig, word: int, state: State) -> None:
     rig.ready(Mode.CYCLIC_TORQUE)

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from rds.bus.modules.cia402.codes import Mode
+from rds.bus.modules.cia402.remote import Remote
 from rds.bus.modules.cia402.settings import read_settings
 from rds.core.errors import InputError
 from rds.machines import Machine
@@ -84,3 +85,24 @@ def test_what_cannot_be_is_refused_in_words(machine: Machine, table: Any, says: 
     with pytest.raises(InputError, match=r"\[bus\.cia402|mini-cnc") as refused:
         read_settings(table, machine, ["X", "Y"])
     assert says in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "table, value, torque, volts",
+    [
+        ({"torque_limit": 200}, 10.0, 200, 2.0),
+        ({"torque_limit": 200}, -3.0, -200, -2.0),
+        ({"torque_limit": 200}, 1.0, 100, 1.0),
+        ({"rated_voltage": 5.0, "direction": -1}, 10.0, -1000, 5.0),
+        ({"rated_voltage": 5.0, "torque_limit": 2000}, 10.0, 2000, 10.0),
+        ({"rated_voltage": 48.0}, 40.0, 833, 39.984),
+    ],
+)
+def test_a_law_may_saturate_at_the_converters_range(
+    machine: Machine, table: dict[str, Any], value: float, torque: int, volts: float
+) -> None:
+    """A controller's 10 V, where the drive may have 2, ended the run: now 2 V are sent, and recorded."""
+    remote = Remote(read_settings({"axis": {"X": table}}, machine, ["X"]).drives[0])
+    assert remote.aim(value) == pytest.approx(volts) and remote.target == torque
+    with pytest.raises(InputError, match="must be from"):
+        remote.aim(50.0)

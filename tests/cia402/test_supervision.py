@@ -205,6 +205,18 @@ def test_a_fault_may_brake_before_the_power_goes(rig: Rig, reaction: int) -> Non
     assert rig.drive.state is State.FAULT and rig.voltage == 0.0 and rig.drive.servo.axis.velocity == 0.0
 
 
+def test_a_reset_that_waits_for_the_emergency_button_resets_nothing(rig: Rig) -> None:
+    rig.keep(rig.drive.set_emergency_input(True, rig.t))
+    rig.write(0x6040, 0x00, 2)
+    rig.write(0x6040, 0x80, 2)
+    rig.keep(rig.drive.set_emergency_input(False, rig.t))
+    rig.write(0x6040, 0x80, 2)
+    assert rig.drive.state is State.FAULT
+    rig.write(0x6040, 0x00, 2)
+    rig.write(0x6040, 0x80, 2)
+    assert rig.drive.state is State.SWITCH_ON_DISABLED
+
+
 def test_the_history_keeps_the_last_eight(rig: Rig) -> None:
     for number in range(10):
         rig.keep(rig.drive.fault(0x2300 + number, rig.t))

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import socket
 import stat
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +29,8 @@ from rds.jobs.address import Address
 from rds.jobs.folder import Folder
 from rds.jobs.jobs import Jobs
 from rds.jobs.requests import VERBS, answer, parse, words_of
+from rds.jobs.server import CLIENTS
+from rds.jobs.server import Server as JobsServer
 from rds.machines import load_machine
 from tests.documents import blocks, save
 from tests.jobs.conftest import Server
@@ -149,6 +155,32 @@ def test_a_server_that_is_too_busy_to_answer_keeps_its_socket(tmp_path: Path) ->
         for client in clients:
             client.close()
     address.listen().close()  # that one has gone, and left it behind
+
+
+def test_no_stop_waits_until_the_files_of_others_are_read(tmp_path: Path) -> None:
+    """With as many files to read as Python has threads for such work, a stop waited for the first of them."""
+    read = threading.Event()
+    jobs: Any = SimpleNamespace(load=lambda *_, **__: read.wait(10.0), stop=lambda _: SimpleNamespace(state="running"))
+    address = Address.of(tmp_path / "jobs.sock")
+
+    async def stopped() -> bytes:
+        server = JobsServer(jobs, address, None)
+        async with await asyncio.start_unix_server(server._meet, sock=address.listen()):
+            server.use_threads(asyncio.get_running_loop())
+            lines = [await asyncio.open_unix_connection(address.path) for _ in range(CLIENTS)]
+            for _, writer in lines[1:]:
+                writer.write(b'{"do": "check", "file": "a"}\n')
+            await asyncio.sleep(0.1)
+            reader, writer = lines[0]
+            writer.write(b'{"do": "stop", "job": 1}\n')
+            try:
+                return await asyncio.wait_for(reader.readline(), 5.0)
+            finally:
+                read.set()
+                for _, writer in lines:
+                    writer.close()
+
+    assert b'"state": "running"' in asyncio.run(stopped())
 
 
 def test_texts_in_an_experiment_may_be_longer_than_names_of_files(tmp_path: Path) -> None:

@@ -210,6 +210,27 @@ def test_voltages_and_set_points_keep_out_of_each_others_way() -> None:
     assert module.control(bytes([Verb.GAIN, 2, 7]), bus.now()) is None  # too short
 
 
+@pytest.mark.parametrize("method", "AC")
+def test_a_second_host_begins_no_motion_of_an_axis_that_moves(method: str) -> None:
+    module, bus, host = bench()
+    gains = can_gains(CNC.axis("X"))
+    kind = Buffer.NONE if method == "A" else Buffer.INCREMENTS
+    host.begin(2, kind, 0, gains)
+    if method == "A":
+        bus.send(motion_frames.SETPOINTS, motion_frames.encode_setpoints([16]))
+    else:
+        for number, piece in enumerate(motion_frames.pieces_of_increments([16] * 60)):
+            bus.send(motion_frames.DATA, bytes([2, number]) + piece)
+        bus.send(motion_frames.CONTROL, bytes([Verb.GO, 0]))
+    bus.sleep(bus.now() + 0.001)
+    with pytest.raises(MachineError, match="another host commands it"):
+        host.begin(2, kind, 32000, [2.0 * gain for gain in gains])
+    assert module.by_itself.moves and module.by_itself._gains == pytest.approx(gains, rel=1e-6)
+    bus.sleep(bus.now() + 0.5)
+    assert abs(module.motion.position) < 0.5
+    host.begin(2, kind, 0, gains)  # it has no set points left
+
+
 def test_a_bus_that_is_too_slow_is_refused_before_the_run(motion: SerialMotion) -> None:
     with pytest.raises(InputError, match=r"method A takes 216 % of 125000 bit/s.*--option period=0\.0054"):
         check_room(CNC, motion, "A", 125_000, motion.period)

@@ -88,13 +88,16 @@ def test_identifiers_are_those_of_the_frames() -> None:
 
 @given(
     st.lists(st.floats(-10, 10), min_size=4, max_size=4),
+    st.integers(0, frames.NUMBERS),
     st.sampled_from(["CycleCommand", "DryCommand", "MoreVoltages"]),
 )
-def test_commands_agree_bit_by_bit(voltages: list[float], name: str) -> None:
+def test_commands_agree_bit_by_bit(voltages: list[float], number: int, name: str) -> None:
     message = DATABASE.get_message_by_name(name)
-    data = frames.encode_voltages(voltages)
+    data = frames.number_voltages(frames.encode_voltages(voltages), number)
     decoded = message.decode(data)
-    assert tuple(decoded.values()) == frames.decode_voltages(message.frame_id, data)
+    told = tuple(value for field, value in sorted(decoded.items()) if field.startswith("Voltage"))
+    assert told == frames.decode_voltages(message.frame_id, data)
+    assert sum(value for field, value in decoded.items() if field.startswith("Number")) == number
     assert message.encode(decoded) == data
 
 
@@ -111,9 +114,11 @@ def test_answers_agree_bit_by_bit(data: bytes) -> None:
     answer = frames.decode_answer(0x24, data)
     fields = DATABASE.get_message_by_name("Answer_X").decode(data, decode_choices=False)
     status = {"Enabled": frames.Status.ENABLED, "Watchdog": frames.Status.WATCHDOG}
-    status |= {"DryRun": frames.Status.DRY_RUN, "Fault": frames.Status.FAULT}
+    status |= {"DryRun": frames.Status.DRY_RUN, "Fault": frames.Status.FAULT, "Limit": frames.Status.LIMIT}
+    status |= {"EmergencyStop": frames.Status.EMERGENCY, "NotSetUp": frames.Status.NOT_SET_UP}
+    status |= {"Refused": frames.Status.REFUSED}
     bits = sum(bit for name, bit in status.items() if fields[name])
-    assert Answer(fields["Counts"], bits | int(fields["StatusSpare"]) << 4, fields["Kind"], fields["Ticks"]) == answer
+    assert Answer(fields["Counts"], bits, fields["Kind"], fields["Ticks"]) == answer
     assert DATABASE.get_message_by_name("Answer_X").encode(fields) == frames.encode_answer(answer) == data
 
 

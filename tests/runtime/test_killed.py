@@ -28,10 +28,11 @@ from rds.bus.modules.calling import find_machine
 from rds.bus.modules.dialects import server_module
 from rds.bus.modules.rds.frames import CALL, Kind, Status, answer_identifier, decode_answer
 from rds.bus.modules.server_process import start_server
+from rds.core.contracts import Counters
 from rds.modes.loop.changes import stop_channel
 from rds.modes.loop.live_values import LiveValues
-from rds.modes.process import recorder
-from rds.modes.process.recorder import READY, Recorder, conclude, watch
+from rds.modes.process import recorder, target
+from rds.modes.process.recorder import CLOSING, READY, Recorder, conclude, watch
 from rds.modes.process.ring import Ring
 from rds.results import Result
 
@@ -150,7 +151,7 @@ def test_a_killed_target(experiment: Maker, during: During, alone: Path) -> None
 def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[subprocess.Popen[bytes], Recorder]]:
     """A target that takes no samples, and its recorder, who is impatient."""
     monkeypatch.setattr(recorder, "HANG_AFTER", 0.3)
-    ring = Ring.create(tmp_path / "a.ring", ["sample"], 10, ready=READY)
+    ring = Ring.create(tmp_path / "a.ring", ["sample"], 10)
     LiveValues.create(ring.live_values_path, []).close()
     ring.beat(READY)
     with subprocess.Popen([sys.executable, "-S", "-c", "input()"], stdin=-1, stderr=subprocess.DEVNULL) as target:
@@ -175,6 +176,48 @@ def test_the_time_of_a_hang_counts_discarded_periods(recorded: tuple[subprocess.
         its.ring.append([sample])
     hung = watch(target, its, 0.001)
     assert hung is not None and "at t = 0.008 s" in hung[1]
+
+
+def test_a_loop_that_has_ended_has_time_to_brake(
+    recorded: tuple[subprocess.Popen[bytes], Recorder], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drives may brake for 5 s, and a bus not answer for 5 s: the student's code was said to hang."""
+    monkeypatch.setattr(recorder, "CLOSES_WITHIN", 0.5)
+    process, its = recorded
+    its.ring.beat(CLOSING)
+    began = time.monotonic()
+    hung = watch(process, its, 0.001)
+    assert time.monotonic() - began > 0.5
+    assert hung is not None and hung[0] == "machine lost"
+    assert "had not let go of the machine" in hung[1] and "control()" not in hung[1]
+
+
+@pytest.mark.parametrize("stop, ending", [(False, ("machine lost", "lost")), (True, ("stopped", "stopped while X"))])
+def test_homing_may_last_and_be_stopped(
+    recorded: tuple[subprocess.Popen[bytes], Recorder], monkeypatch: pytest.MonkeyPatch, stop: bool, ending: Any
+) -> None:
+    """It has a time of its own, longer than that of all the rest: a stop was heard only when it was over."""
+    ring, beats = recorded[1].ring, []
+    ring.beat(0)
+
+    def start(homing: Callable[[str, float], None]) -> None:
+        for place in range(3):
+            homing("X", place)
+            beats.append(ring.heartbeat)
+        if stop:
+            ring.ask_to_stop()
+            homing("X", 3.0)
+        raise rds.MachineError("lost")
+
+    drivers = SimpleNamespace(start=start, close=lambda: None, counters=Counters())
+    monkeypatch.setattr(target, "prepare", lambda priority, cpu: {})
+    monkeypatch.setattr("rds.bus.modules.dialects.open_drivers", lambda *_: drivers)
+    plan: Any = SimpleNamespace(mode="implementation", T=0.001, late=None, priority=0, cpu=None, machine=None, names=[])
+    plan.bus = {"interface": "virtual"}
+    report = target.run(plan, ring, LiveValues.open(ring.live_values_path))
+    assert report["ending"] == ending[0] and report["reason"].startswith(ending[1])
+    assert len(set(beats[:2])) == 2 and max(beats) < READY
+    assert ring.heartbeat == CLOSING
 
 
 def test_a_recorder_that_was_held_up_kills_nobody(
@@ -213,7 +256,7 @@ def test_the_command_of_a_killed_run_is_cleared_away(alone: Path, monkeypatch: p
 
 def test_what_an_earlier_run_without_a_recorder_left_is_not_taken_for_this_one_s(tmp_path: Path) -> None:
     """Here the target is a module of Python's that ends at once."""
-    about = {"run": "1", "ready": READY, "sample_period": 0.001, "samples": 10, "units": {}}
+    about = {"run": "1", "sample_period": 0.001, "samples": 10, "units": {}}
     ring = Ring.create(tmp_path / "rds-0.ring", ["sample"], 10, **about)
     LiveValues.create(ring.live_values_path, [stop_channel()]).close()
     (tmp_path / "target.json").write_text('{"ending": "done", "reason": ""}')

@@ -45,7 +45,7 @@ def test_a_host_that_dies_with_all_its_processes(bench: Bench, tmp_path: Path) -
         os.kill(pid, signal.SIGKILL)
     bench.stands_without_voltage()
     left = open_result(tmp_path / "out")
-    assert left.meta["ending"] == "killed"
+    assert left.meta["ending"] == "killed" and "all its processes were killed" in left.meta["ending_reason"]
     assert f"the part program was in line {LINE}" in left.meta["notes"][-1]
     assert left["program_sample"][-1] > 0.0
     assert np.isfinite(left["X_measured"]).all()

@@ -96,6 +96,18 @@ def test_a_step_goes_from_where_the_axis_is_held(tmp_path: Path, monkeypatch: py
     assert orders == [{"goals": [["X", 1.01]], "speed": None}]
 
 
+def test_steps_add_up_while_the_axis_is_still_on_its_way(jog: Jog) -> None:
+    """Two presses of 1 mm, one soon after the other, went 1.3 mm."""
+    jog.choices.set("step", "1")
+    for _ in range(2):
+        jog.step("Y", 1)
+    wait_for(lambda: jog.positions["Y"] == pytest.approx(2.0, abs=0.008))
+    jog.step("Y", 1)
+    jog.rest()
+    wait_for(lambda: not jog.moving)
+    assert jog._stepped == {}  # it was not to come there after all
+
+
 def test_one_hand_at_a_time_and_the_emergency_stop_ends_it(jog: Jog) -> None:
     with pytest.raises(InputError, match="in use"):
         Session(jog.session.folder).take_machine("something else", object())

@@ -23,7 +23,7 @@ from rds.bus.modules.cia402.codes import State
 from rds.bus.modules.cia402.scan import scan
 from rds.bus.modules.dialects import server_module
 from rds.cli.main import app
-from rds.core.errors import InputError
+from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 from rds.panels.jog.hands import VoltageHand
 from rds.panels.jog.orders import SPINDLE_DEAD_MAN
@@ -217,6 +217,26 @@ def test_what_modules_that_take_voltages_cannot_move_is_left_out_with_its_reason
         assert list(hand.axes) == ["X", "Z"] and not hand.spindles
         assert "no model with tau and K" in hand.left_out["Y"] and "no model with tau and K" in hand.left_out["C"]
         assert "no module answers" in hand.left_out["spindle"]
+    finally:
+        hand.close()
+
+
+def test_an_axis_that_goes_astray_is_let_go(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One with a wrong sign ran to its end at full voltage, held or not; one that was blocked was pushed for ever."""
+    hand = VoltageHand(load_machine("mini-cnc"), "rds", {"interface": "virtual", "channel": "astray"})
+    try:
+        monkeypatch.setattr(hand._drivers, "write", lambda volts: None)
+        rest = dict.fromkeys(hand.axes, 0.0)
+        hand._measured = rest | {"X": 1.0}
+        for _ in range(50):  # in which its module may say nothing
+            hand.write(rest, rest)
+        hand._measured = rest | {"X": 0.3}  # half the voltage
+        for _ in range(500):
+            hand.write(rest, rest)
+        hand._measured = rest | {"X": -1.0}
+        with pytest.raises(MachineError, match="X is 1 mm from where it is to be"):
+            for _ in range(110):
+                hand.write(rest, rest)
     finally:
         hand.close()
 

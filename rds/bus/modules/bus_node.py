@@ -15,7 +15,7 @@ LOG = logging.getLogger(__name__)
 
 RETRY = 0.5  # s between attempts to open a bus that failed
 _SEND_TIMEOUT = 0.1  # s
-_AHEAD = 1.0  # s by which a stamp may be ahead of this computer's clock: clocks drift while nothing comes
+_AHEAD = 1.0  # s by which a stamp may be ahead of this computer's clock, or behind: clocks drift while nothing comes
 Outgoing = tuple[int, bytes, bool]  # identifier, data, extended
 
 
@@ -138,7 +138,8 @@ class BusTime:
         local, instant = time.monotonic(), stamp + self._shift
         now = local + self._quickest
         if not self._last <= instant <= now + _AHEAD:
-            instant = self._last if instant < self._last else max(self._last, now)
+            overtaken = 0.0 < self._last - instant < _AHEAD  # by a frame that was stamped later; else a clock was set
+            instant = self._last if overtaken else max(self._last, now)
             self._shift = instant - stamp
         self._last = instant
         self._offset = instant - local

@@ -35,7 +35,7 @@ from rds.modes.process.live import Live
 from rds.modes.process.machine import BUILTIN, machine_behind
 from rds.modes.process.processes import end_group, is_alive, wait_for_end
 from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
-from rds.modes.process.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
+from rds.modes.process.recorder import PLAN, Recorder, finish, patience
 from rds.modes.process.ring import Ring
 from rds.modes.process.shared import folders, remove_left
 
@@ -164,7 +164,7 @@ def _recorded(
 ) -> bool:
     """Let a recorder start the target, and wait for the end of the run; whether there is a sample."""
     about: dict[str, Any] = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}
-    about |= {"sample_period": plan.T, "samples": plan.samples, "run": secrets.token_hex(8), "ready": READY}
+    about |= {"sample_period": plan.T, "samples": plan.samples, "run": secrets.token_hex(8)}
     if plan.bus.get("interface") == BUILTIN:
         about["channel"] = plan.bus["channel"]
     capacity = min(plan.most_samples, max(_RING_BYTES // (8 * len(columns)), 1000))
@@ -287,10 +287,12 @@ def _take_over(directory: Path, ring: Ring, period: float, reason: str) -> None:
         target = int(json.loads((directory / PROCESSES).read_text())["target"])
     except (OSError, ValueError, KeyError):
         target = 0  # it died before it started one
-    deadline = time.monotonic() + max(HANG_AFTER, 20 * period)
+    seen, since = (-1, -1), time.monotonic()
     while target and is_alive(target, str(ring.path)):
-        recorder.drain()
-        if time.monotonic() > deadline:
+        now = (recorder.drain(), ring.heartbeat)
+        if now != seen:
+            seen, since = now, time.monotonic()
+        if time.monotonic() - since > patience(ring, period):
             os.kill(target, getattr(signal, "SIGKILL", signal.SIGTERM))  # Windows has the second alone, which ends it
             break
         time.sleep(_POLL)

@@ -28,6 +28,7 @@ ENDING = "ending.json"
 PROCESSES = "processes.json"  # while a run goes on: the numbers of its processes
 UNSTARTED = "unstarted.json"  # the ending of a run that took no sample, on its way to the host
 _FIRST_LINE = b"RDS record 1\n"
+_UNTOLD = "nothing was noted of its end: all its processes were killed, or it goes on; what it recorded is here"
 
 
 class RecordFile:
@@ -211,10 +212,11 @@ def table(names: Sequence[str], units: Mapping[str, str], rows: Any, T: float) -
 def read_record(directory: str | Path) -> tuple[dict[str, Any], dict[str, str], dict[str, Any]]:
     """Columns, units and description of the record in `directory`, up to its last whole row.
 
-    `ending` is what the run noted itself, else that it was killed. Raises InputError for a record that can't be read.
+    `ending` is what the run noted itself, else that it was killed, as of one that goes on. Raises InputError for a
+    record that can't be read.
     """
     about, rows = read_raw(directory)
-    left = read_ending(directory)
+    left = read_ending(directory) or {"reason": _UNTOLD}
     try:
         units, period, expected = about["units"], about["sample_period"], about["samples"]
         columns, units = table(about["columns"], units, rows, period)

@@ -34,8 +34,9 @@ from rds.modes.process.ring import Ring
 DRAIN_EVERY = 0.05  # s
 HANG_AFTER = 5.0  # s without a new sample, or 20 periods if that is longer
 HELD_UP = 1.0  # s for one look: this process did not run
-READY_WITHIN = 60.0  # s from the start of the target to its first sample
-READY = 2  # heartbeats of the target when its loop begins
+READY_WITHIN = 60.0  # s from the start of the target to its first sample, without the time of homing
+CLOSES_WITHIN = 30.0  # s from the end of the loop to that of the target: drives brake, and a bus may not answer
+READY, CLOSING = 2, 3  # heartbeats of the target when its loop begins, and when it has ended
 PLAN, REPORT, LOG, TRACE = "plan.pickle", "target.json", "target.log", "target.trace"
 ASK_WHERE = getattr(signal, "SIGUSR1", None)  # the target answers in the file TRACE
 ANSWERS_WITHIN = 1.0  # s
@@ -96,12 +97,18 @@ class Recorder:
             self._file.close()
 
 
+def patience(ring: Ring, period: float) -> float:
+    """How long the target may be without a new sample and a new heartbeat in its phase, s."""
+    if ring.heartbeat < READY:
+        return READY_WITHIN
+    return CLOSES_WITHIN if ring.heartbeat >= CLOSING else max(HANG_AFTER, 20 * period)
+
+
 def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) -> tuple[Ending, str] | None:
     """Record until the target ends; if it hangs, kill it and return what ending that is, and why.
 
     Time in which this process was held up itself does not count: the target may have been, too.
     """
-    hang_after = max(HANG_AFTER, 20 * period)
     host = os.getppid()
     seen, since = (-1, -1), time.monotonic()
     while target.poll() is None:
@@ -116,8 +123,8 @@ def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) ->
         elif (took := time.monotonic() - looked) > HELD_UP:
             since += took
         quiet = time.monotonic() - since
-        is_running = recorder.ring.heartbeat >= recorder.ring.about["ready"]
-        if quiet > (hang_after if is_running else READY_WITHIN):
+        heartbeat = recorder.ring.heartbeat
+        if quiet > patience(recorder.ring, period):
             stopped = is_stopped(target.pid)
             where = "" if stopped else _where(recorder.directory, target)
             target.kill()
@@ -128,7 +135,12 @@ def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) ->
                     f"the target process was stopped from outside (SIGSTOP, or a debugger) {at}, and did not go on for "
                     f"{quiet:.0f} s. It was killed; the watchdogs cut the voltage"
                 )
-            if is_running:
+            if heartbeat >= CLOSING:
+                return Ending.MACHINE_LOST, (
+                    f"the loop ended {at}, and the target had not let go of the machine {quiet:.0f} s later{where}: "
+                    "see whether its bus or adapter still answers. The target was killed; the watchdogs cut the voltage"
+                )
+            if heartbeat >= READY:
                 return Ending.FAULT, (
                     f"control() or the model did not return for {quiet:.0f} s {at}{where}; "
                     "look for a loop without an end in it. The target was killed; the watchdogs cut the voltage"

@@ -107,11 +107,11 @@ class Ring:
 
     @property
     def heartbeat(self) -> int:
-        """A count that the target raises while it is getting ready."""
+        """How far the target has come, by a count that it changes while it gets ready and when it closes."""
         return read_word(self._memory, _HEARTBEAT)
 
     def beat(self, count: int) -> None:
-        """Say that the target has come to step `count` of getting ready."""
+        """Say that the target has come to step `count`."""
         write_word(self._memory, _HEARTBEAT, count)
 
     def close(self) -> None:

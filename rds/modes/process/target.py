@@ -26,16 +26,21 @@ from rds.core.errors import AdapterError, MachineError, RdsError
 from rds.core.private_files import keep_process_private, open_private
 from rds.core.types import Ending
 from rds.modes import load_mode
+from rds.modes.loop.changes import STOP
 from rds.modes.loop.live_values import LiveValues
 from rds.modes.loop.plan import Plan, load
 from rds.modes.loop.stopwatch import Stopwatch, quiet_memory
 from rds.modes.process.blame import fault
 from rds.modes.process.environment import describe_environment, prepare, stolen_ticks
 from rds.modes.process.record import write_whole
-from rds.modes.process.recorder import ASK_WHERE, PLAN, READY, REPORT, TRACE
+from rds.modes.process.recorder import ASK_WHERE, CLOSING, PLAN, READY, REPORT, TRACE
 from rds.modes.process.ring import Ring
 
 log = logging.getLogger(__name__)
+
+
+class _Stopped(Exception):
+    """Somebody wants the end before the first sample."""
 
 
 def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
@@ -55,11 +60,17 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
     faults, dialect = bus.pop("faults", ()), bus.pop("dialect", DEFAULT)
     threads = threading.active_count()
     stack = ExitStack()
+
+    def homing(axis: str, position: float) -> None:
+        ring.beat(1 - ring.heartbeat)  # it goes on
+        if ring.stop_asked() or live_values.values().get(STOP):
+            raise _Stopped(f"stopped while {axis} was homed; it has no power, and is to be homed again")
+
     try:
         if bus["interface"] == "rds":
             stack.enter_context(Command(bus["channel"]))
         drivers = open_drivers(dialect, plan.machine, plan.names, plan.T, mode.drivers == "dry run", bus)
-        drivers.start()
+        drivers.start(homing)
         if bus["interface"] == "rds":
             watch = stack.enter_context(RunWatch(bus["channel"], faults))
         ring.beat(1)
@@ -84,6 +95,8 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
         report["reason"] = loop.changes.reason
         if report["ending"] is Ending.DONE:
             drivers.confirm()
+    except _Stopped as stopped:
+        report |= {"ending": Ending.STOPPED, "reason": str(stopped)}
     except MachineError as error:
         ending = Ending.ADAPTER_LOST if isinstance(error, AdapterError) else Ending.MACHINE_LOST
         report |= {"ending": ending, "reason": str(error)}
@@ -92,6 +105,7 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
             log.exception("the run ended by an exception")
         report["reason"] = fault(plan, error, loop.k if loop else None)
     finally:
+        ring.beat(CLOSING)
         environment["threads"] = threading.active_count() - threads  # that the student's code left running
         if drivers is not None:
             report["drivers"] = {name: n - counted.get(name, 0) for name, n in asdict(drivers.counters).items()}

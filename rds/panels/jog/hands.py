@@ -19,6 +19,7 @@ from rds.panels.jog.axes import JogAxis, JogSpindle, jog_axes, jog_spindles
 
 _COUNTS = 5.0  # of error at rest over which friction is made up for
 _ANSWERS_IN = 0.5  # s in which a spindle's module has to say that it is there
+_ASTRAY = 0.2  # s; longer than a module may be silent
 _FROM_SWITCHES = 1e-3  # of the travel, which is left between an axis and its limit switch: to touch one is a fault
 
 
@@ -60,6 +61,11 @@ class AxisLaw:
     friction: tuple[float, float]  # lost speed, forwards and backwards (negative)
     voltage: float  # the most
     resolution: float
+
+    @property
+    def farthest(self) -> float:
+        """The error for which Kp alone asks for the whole voltage: more than any speed of a right axis makes."""
+        return 2.0 * self.tau * abs(self.K) * self.voltage
 
     def volts(self, error: float, velocity: float) -> float:
         """The voltage for an error of position and a reference velocity.
@@ -115,6 +121,7 @@ class VoltageHand:
         self._drivers = open_drivers(dialect, machine, self._names, self.period, False, options)
         self._origin = [0.0] * len(self._names)
         self._measured: dict[str, float] = {}
+        self._astray = dict.fromkeys(self._laws, 0)  # periods in a row in which an axis is too far from its reference
 
     def start(self) -> None:
         """As Hand.start; positions count from the modules' own zero."""
@@ -128,8 +135,16 @@ class VoltageHand:
         return self._measured
 
     def write(self, places: Mapping[str, float], speeds: Mapping[str, float]) -> None:
-        """As Hand.write."""
+        """As Hand.write. MachineError for an axis that is far from its reference, and stays so."""
         measured = self._measured
+        for name, law in self._laws.items():
+            error = measured[name] - places[name]
+            self._astray[name] = self._astray[name] + 1 if abs(error) > law.farthest else 0
+            if self._astray[name] * self.period > _ASTRAY:
+                raise MachineError(
+                    f"{name} is {abs(error):.3g} {self.axes[name].unit} from where it is to be, and was let go: see "
+                    "whether it is blocked, or its voltage, its encoder or K of its model has the wrong sign"
+                )
         volts = [law.volts(places[name] - measured[name], speeds[name]) for name, law in self._laws.items()]
         volts += [law.volts(speeds[name], measured[name]) for name, law in self._turners.items()]
         self._drivers.write(volts)

@@ -78,6 +78,7 @@ class Jog:
         self.choices = session.choices("jog", _fields(self.axes, self.spindles))
         self.positions: dict[str, float] = {}
         self._places: dict[str, float] = {}  # where the axes are held, of which what is measured is some counts off
+        self._stepped: dict[str, float] = {}  # where the axis comes to that goes by steps, if that was the last order
         self.speeds: dict[str, float] = {}
         self.left_out: dict[str, str] = {}
         self.dialect = ""
@@ -218,7 +219,7 @@ class Jog:
         for end in reversed(ends):  # the loop before the modules that it tells to stand
             end()
         self._server = None
-        self.positions, self.speeds, self.moving, self.homing = {}, {}, False, ""
+        self.positions, self.speeds, self._stepped, self.moving, self.homing = {}, {}, {}, False, ""
         self.session.give_machine_back(self)
 
     stop = end  # what the emergency stop calls
@@ -240,8 +241,14 @@ class Jog:
             self._order(halt=True)
 
     def step(self, axis: str, direction: int) -> None:
-        """Move by the step chosen, from where the axis is held. InputError where that leaves the travel."""
-        self.go(axis, self._places.get(axis, 0.0) + direction * float(self.choices["step"]))
+        """Move by the step chosen, from where the axis is held, or will be after the steps before.
+
+        InputError where that leaves the travel.
+        """
+        start = self._stepped.get(axis, self._places.get(axis, 0.0))
+        goal = start + direction * float(self.choices["step"])
+        self.go(axis, goal)
+        self._stepped = {axis: goal}
 
     def go(self, axis: str, goal: float, speed: float | None = None) -> None:
         """Move to a position, at `speed` or that which is chosen. InputError where it is out of the travel."""
@@ -327,6 +334,8 @@ class Jog:
         try:
             with self._lock:
                 order |= {"speed": self.choices["speed"] if speed is None else speed, "at": time.monotonic()}
+                if "turn" not in order:
+                    self._stepped = {}
                 loop.stdin.write(json.dumps(order) + "\n")
                 loop.stdin.flush()
         except OSError as error:
@@ -340,6 +349,7 @@ class Jog:
                 self.axes[name] = replace(self.axes[name], travel=tuple(travel))
             self.left_out = dict(words["left_out"])
         elif "late" in words:
+            self._stepped = {}
             self.session.say(refusal("The motion", words["late"]), "warning")
         elif "homed" in words:
             self.homed |= set(words["homed"])

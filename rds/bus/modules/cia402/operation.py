@@ -115,8 +115,6 @@ class Operation:
 
     def control(self, word: int) -> None:
         """Obey a controlword, 0x6040."""
-        if self.interlock and word & codes.FAULT_RESET:
-            return
         if command(word) is Command.ENABLE_OPERATION and not self._is_powered() and self.is_host_missing():
             return
         option = {Command.SWITCH_ON: 0x605C, Command.SHUTDOWN: 0x605B}.get(command(word))
@@ -128,7 +126,7 @@ class Operation:
         if self._leaving is not None and command(word) is Command.ENABLE_OPERATION:
             self._leaving = None
             self._start_mode()
-        for number in self.machine.control(word, self.objects[0x605A] in _STAYING):
+        for number in self.machine.control(word, self.objects[0x605A] in _STAYING, not self.interlock):
             self._pass(number)
         if self._mode is not None and self._leaving is None:
             self._mode.control(word, self.now)
@@ -240,8 +238,8 @@ class Operation:
             self._brake(self.objects[0x6085 if option in (2, 6) else 0x6084])
 
     def _brake(self, deceleration: float) -> None:
-        """A ramp to zero speed; _stopped() when the axis stands."""
-        self._mode = None
+        """A ramp to zero speed, whatever it was to lead to before; _stopped() when the axis stands."""
+        self._mode = self._leaving = None
         self.servo.guarded = False
         velocity = self.servo.velocity
         self._stop = Ramp(velocity, 0.0, deceleration, deceleration)

@@ -31,13 +31,14 @@ class Remote(Module):
 
     __slots__ = (
         "_command",
-        "_counts_limit",
         "_factor",
         "_handed",
+        "_highest",
         "_pack",
         "_placed",
         "_settings",
         "_size",
+        "_torque_limit",
         "_unpack",
         "answers_at",
         "controlword",
@@ -67,7 +68,8 @@ class Remote(Module):
                 Command.CSV: settings.velocity_counts,
             }[settings.command]
         )
-        self._counts_limit = settings.torque_limit if torque else _HALF - 1
+        self._torque_limit = settings.torque_limit if torque else _HALF - 1
+        self._highest = settings.highest_voltage * abs(self._factor) if torque else _HALF - 1  # in the drive's units
         self.use(standard(settings))
         self.controlword = codes.DISABLE_VOLTAGE
         self.target = 0  # in the drive's units, as the next RPDO carries it
@@ -113,13 +115,14 @@ class Remote(Module):
     def aim(self, value: float) -> float:
         """Take the next target (V, or the axis's unit, or unit/s); returns it as it will be sent.
 
-        Raises InputError for one that the drive's numbers can't say, or above the torque limit.
+        A voltage beyond the torque limit is sent as that limit. Raises InputError for one beyond the converter's range,
+        and for a target that the drive's numbers can't say.
         """
         target = value * self._factor
-        if not abs(target) <= self._counts_limit * _LAST_BIT:  # false for NaN too
+        if not abs(target) <= self._highest * _LAST_BIT:  # false for NaN too
             unit, limit = self._unit()
             raise InputError(f"{value!r} {unit} for {self} must be from -{limit:g} to {limit:g} {unit}")
-        self.target = round(target)
+        self.target = max(-self._torque_limit, min(self._torque_limit, round(target)))
         if self._command.leads_position:
             self.target = (self.target + self.origin + _HALF) % _TURN - _HALF
             return round(target) / self._factor
@@ -182,4 +185,4 @@ class Remote(Module):
             Command.PP: unit,
             Command.CSV: unit if self._settings.reads_velocity else f"{unit}/s",
         }
-        return name[self._command], self._counts_limit / abs(self._factor)
+        return name[self._command], self._highest / abs(self._factor)

@@ -59,6 +59,7 @@ class DriveSettings:
     velocity_counts: float  # velocity units of the drive per mm/s; for a spindle per rev/min
     rated_voltage: float  # V: what the loop's voltage is when the drive gives 1000 ‰ torque
     torque_limit: int  # ‰
+    highest_voltage: float  # V, that the loop may give; what is beyond the torque limit is sent as that
     direction: int  # 1, or -1 if the drive counts the other way round
     homing: int | None  # method 0x6098, carried out at the start
     home_offset: int | None  # 0x607C, counts: minus the position that home gets; None: as the drive has it
@@ -190,6 +191,9 @@ def _drive(axis: Axis, table: Mapping[str, Any], machine: Machine) -> DriveSetti
         if "eds" not in table and homing not in METHODS:
             raise InputError(f"homing = {homing} must be one of {', '.join(map(str, METHODS))}", where)
     direction = _whole(table, "direction", 1, (1, -1), where)
+    converter = machine.converter.range
+    rated = _more_than_0(table, "rated_voltage", converter, _MORE_THAN_0["rated_voltage"], where)
+    torque = _whole(table, "torque_limit", 1000, range(1, 32768), where)
     return DriveSettings(
         axis=axis,
         command=_command(table["mode"], where),
@@ -199,10 +203,9 @@ def _drive(axis: Axis, table: Mapping[str, Any], machine: Machine) -> DriveSetti
         velocity_counts=_more_than_0(
             table, "velocity_counts", counts / 60.0 if spindle else counts, _MORE_THAN_0["velocity_counts"], where
         ),
-        rated_voltage=_more_than_0(
-            table, "rated_voltage", machine.converter.range, _MORE_THAN_0["rated_voltage"], where
-        ),
-        torque_limit=_whole(table, "torque_limit", 1000, range(1, 32768), where),
+        rated_voltage=rated,
+        torque_limit=torque,
+        highest_voltage=max(converter, 1e-3 * torque * rated),
         direction=direction,
         homing=homing,
         home_offset=_home_offset(table, direction * counts, where),

@@ -89,12 +89,15 @@ class StateMachine:
         """The self-test is over."""
         return self._make(1) if self.state is State.NOT_READY else []
 
-    def control(self, controlword: int, may_resume: bool = False) -> list[int]:
-        """Obey a controlword. `may_resume`: QUICK STOP ACTIVE may be left to OPERATION ENABLED (option codes 5, 6)."""
+    def control(self, controlword: int, may_resume: bool = False, may_reset: bool = True) -> list[int]:
+        """Obey a controlword. `may_resume`: QUICK STOP ACTIVE may be left to OPERATION ENABLED (option codes 5, 6).
+
+        `may_reset`: a fault may be reset; an edge that comes while it may not resets nothing later.
+        """
         reset = bool(controlword & _FAULT_RESET_BIT)
         rising, self._reset_bit = reset and not self._reset_bit, reset
         if self.state is State.FAULT:
-            return self._make(15) if rising else []
+            return self._make(15) if rising and may_reset else []
         wanted = command(controlword)
         number = _COMMANDED.get((self.state, wanted))
         if number is None or (number == 16 and not may_resume):

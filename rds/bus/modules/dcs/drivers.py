@@ -31,6 +31,7 @@ LOG = logging.getLogger(__name__)
 
 SILENT_AFTER = 10  # periods without an answer; then all axes get zero volts
 LOST_AFTER = 0.3  # s without an answer, and SILENT_AFTER periods at least: the run ends
+_SET_UPS = 3  # a frame may be damaged, and a unit that has the set-up of an earlier host does not tell
 _STARTING = 1.0  # s for all units to answer at the start
 _MARGIN = 0.8  # of a period that a frame and its answers may take
 
@@ -137,10 +138,11 @@ class DcsDrivers(drivers_base.DriversBase[_Unit, Answer]):
     def _set_up(self, watch: Watch) -> None:
         """Tell the period, and check by zero-volt ticks that every unit answers and is set up."""
         self._waiting, self._waiting_voltages = self._zero, (0.0,) * len(self._modules)
-        deadline = time.monotonic() + _STARTING
-        while silent := [unit for unit in self._modules if not unit.seen]:
-            if time.monotonic() > deadline:
+        deadline, told = time.monotonic() + _STARTING, 0
+        while (silent := [unit for unit in self._modules if not unit.seen]) or told < _SET_UPS:
+            if silent and time.monotonic() > deadline:
                 raise self._silent(silent)
+            told += 1
             for unit in self._modules:
                 unit.missed = 0
             self._send(self._info._replace(mode=Mode.SETUP), self._setup)

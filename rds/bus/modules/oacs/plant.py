@@ -74,8 +74,9 @@ class Plant(MachineAxis):
         return super().output() if self.tool else self.counter.recorded * self._resolution
 
     def command(self, voltage: float, at: float) -> None:
-        """A voltage is commanded at the instant `at`; zero instead of what must not be."""
-        super().command(self.allowed(voltage), at)
+        """A voltage is commanded at the instant `at`; zero instead of what must not be, none in an emergency stop."""
+        if not self.emergency:
+            super().command(self.allowed(voltage), at)
 
     def drive(self, duty: float, at: float) -> None:
         """The node's own controller sets the motor driver's duty (-255 to 255), at once."""

@@ -35,7 +35,11 @@ SILENT_AFTER = 10  # periods in a row without an answer; then all axes get zero 
 LOST_AFTER = 0.1  # s without an answer, and SILENT_AFTER periods at least: the run ends. Computers stall for less
 _STARTING = 1.0  # s for all modules to answer at the start
 _SET_UP_AGAIN = 20  # ticks at the start, a quarter of it at most, until a module that was not set up is so again
+_SET_UPS = 3  # at the start: a frame may be lost, and a module that has a set-up already does not tell
+_IGNORED = 10  # commands in a row: the first one after a silence is not taken
+_SET_UP_TRIES, _SET_UP_TICKS = 3, 5  # for a module that takes no commands, though it answers
 _RELEASE = "release its button, then `rds estop --reset`, or Release at the top of the page"
+_OBEYS = int(Status.ENABLED | Status.DRY_RUN)
 _ALARMS = int(Status.EMERGENCY | Status.NOT_SET_UP | Status.REFUSED)  # a plain number: flags cost 1 µs
 
 
@@ -52,12 +56,13 @@ class Counters(contracts.Counters):
 class _Module(drivers_base.Module):
     """A module of the cyclic frames, and the order of its answers."""
 
-    __slots__ = ("axis", "doubtful", "order")
+    __slots__ = ("axis", "doubtful", "ignored", "order")
 
     def __init__(self, axis: Axis):
         super().__init__(f"{axis.name} (node {axis.node})", axis.resolution, absolute=axis.unit == "rev/min")
         self.axis = axis
         self.order = AnswerOrder()
+        self.ignored = 0  # commands in a row that it has answered and not taken, at the start
         self.doubtful: Answer | None = None  # since the last tick: to a tick before, or to this one after a lost one
 
 
@@ -152,6 +157,8 @@ class AxisDrivers(CanDrivers[_Module]):
         """Set the sample period, and check by zero-volt ticks that every module answers."""
         self._waiting = self._waiting_more = self._zero
         self._waiting_voltages = (0.0,) * len(self._modules)
+        for module in self._modules:
+            module.ignored = 0
         self._send(frames.SETUP, self._setup)
         deadline = time.monotonic() + _STARTING
         again = min(_SET_UP_AGAIN, ceil(0.25 * _STARTING / self._period))
@@ -168,6 +175,24 @@ class AxisDrivers(CanDrivers[_Module]):
                 if isinstance(error.__cause__, can.CanTimeoutError):  # with bit timing: nobody acknowledges the ticks
                     raise self._silent([module for module in self._modules if not module.seen]) from error
                 raise
+        for _ in range(_SET_UPS - 1):  # by that of an earlier host, a module might cut the voltage too late
+            self._send(frames.SETUP, self._setup)
+            self.exchange()
+
+    def _wait_for_standstill(self) -> None:
+        """As DriversBase. One that did not get the set-up, and has one of an earlier host, gets it now."""
+        super()._wait_for_standstill()
+        most = min(_IGNORED, ceil(1.0 / self._period))
+        for _ in range(_SET_UP_TRIES):
+            if not (deaf := [module for module in self._modules if module.ignored >= most]):
+                return
+            self._send(frames.SETUP, self._setup)
+            for _ in range(_SET_UP_TICKS):
+                self._paced_exchange()
+        raise MachineError(
+            f"{', '.join(map(str, deaf))} on bus {self._bus_name} answers, and takes no command of a sample period of "
+            f"{self._period:g} s; switch it off and on, then start again"
+        )
 
     # --- the cycle
 
@@ -203,6 +228,8 @@ class AxisDrivers(CanDrivers[_Module]):
             return module
         place = self._place(module, answer)
         if place is Place.LAST:
+            if not self._started:
+                module.ignored = 0 if answer.status & _OBEYS else module.ignored + 1
             self._count_lost(module.order.take(answer))
             module.counts = answer.counts
             return module

@@ -11,7 +11,7 @@ too old, or of a second host (freshness.py), is refused and not answered. Number
 been set up, so one that was exchanged or has restarted stands still. The emergency stop is latched until it is reset.
 
 By methods A, B and C the module closes its position loop itself (node_motion.py). While it does, it takes no voltages;
-while a host commands voltages, it begins no such motion.
+while a host commands voltages or a motion has set points left, it begins no such motion.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ class AxisModule:
         if len(data) < 2 or data[1] not in (0, self.node):
             return None
         self.by_itself.expire(at)
-        if data[0] == Verb.BEGIN and self._expires is not None:
+        if data[0] in (Verb.BEGIN, Verb.GAIN) and (self._expires is not None or self.by_itself.moves):
             self._refuse("a motion", Verdict.STRANGE.value, at)
             return None
         try:
@@ -233,8 +233,8 @@ class AxisModule:
         counts = self._counts(at)
         self.ticks += 1
         self.status = status
-        if voltage is not None or self.emergency:
-            self.motion.command(0.0 if self.emergency else self._scale * (voltage or 0.0), at)
+        if voltage is not None and not self.emergency:  # which has cut it, and what an amplifier adds to zero volts
+            self.motion.command(self._scale * voltage, at)
             self._cuts = at + OLDEST * self._period
         self._expires = at + WATCHDOG_PERIODS * self._period
         return frames.encode_answer(Answer(counts, self._whole_status(at), Kind.ANSWER, self.ticks))

@@ -86,7 +86,7 @@ class MotionStatus(IntFlag):
 
     NONE = 0
     READY = 1  # it has begun, and stands or moves by set points
-    RUNNING = 2
+    RUNNING = 2  # it follows set points, and takes no other motion
     EMPTY = 4  # its buffer ran empty while it ran
     SILENT = 8  # the host said nothing for a second: zero volts
     FAR = 0x10  # the axis was too far from its set point: zero volts

@@ -100,7 +100,7 @@ class MotionHost:
             raise MachineError(
                 f"{self.title(node)} has its emergency stop latched; press Release on the page, or rds estop --reset"
             )
-        if not status & MotionStatus.READY:
+        if not status & MotionStatus.READY or status & MotionStatus.RUNNING:
             raise MachineError(f"{self.title(node)} does not begin: another host commands it; end that run")
 
     def stop_all(self) -> None:

@@ -70,6 +70,13 @@ class NodeMotion:
         return bool(self.status & MotionStatus.READY)
 
     @property
+    def moves(self) -> bool:
+        """Whether it still has set points to follow."""
+        if self._kind is Buffer.NONE:
+            return self.active and self._due < inf
+        return bool(self.status & MotionStatus.RUNNING and (self._steps or self._segments or self._equations))
+
+    @property
     def expires(self) -> float:
         """The next instant at which something is due, bus time in s."""
         return min(self._due, self._until)
@@ -131,6 +138,7 @@ class NodeMotion:
         if self.active and self._kind is Buffer.NONE:
             self._follow(codes.decode_setpoint(data, slot, self._position), at)
             self._due = at + _OLDEST * self._period
+            self.status |= MotionStatus.RUNNING if self.active else MotionStatus.NONE
             self._hear(at)
 
     def _hear(self, at: float) -> None:
@@ -153,6 +161,7 @@ class NodeMotion:
             if self._kind is Buffer.NONE:
                 self._axis.cut(self._due)
                 self._due = inf
+                self.status &= ~MotionStatus.RUNNING
             else:
                 self._make_step(self._due)
 
@@ -199,15 +208,15 @@ class NodeMotion:
         if self.gauge is not None:
             self.gauge.append((at, true))
         error = 0 if self._turns else self._position - round(true / self._resolution)
-        if abs(error) > FAR:
-            LOG.warning("module %s: %g counts from its set point, zero volts", self.name, error)
-            self.stop(at, MotionStatus.FAR)
-            return
         proportional, velocity, forward, backward, integral = self._gains
         speed = (target - self._position) / self._period
         friction = forward if speed > 0.0 else backward if speed < 0.0 else 0.0
         total = self._sum + error * self._period
         voltage = proportional * error + integral * total + velocity * speed + friction
+        if not (abs(error) <= FAR and abs(voltage) < inf):  # nor what a gain or a set point makes that is no number
+            LOG.warning("module %s: %g counts from its set point, zero volts", self.name, error)
+            self.stop(at, MotionStatus.FAR)
+            return
         if abs(voltage) <= self._highest:
             self._sum = total
         self._axis.command(max(-self._highest, min(self._highest, voltage)), at)
