@@ -63,6 +63,12 @@ def test_gain_and_filter_are_those_of_python_control() -> None:
     assert design.gain[0] == pytest.approx(plain[0, 0], rel=0.2)  # whose cost is of the instants only
 
 
+@pytest.mark.parametrize("extreme", [{"error": 1e-300}, {"voltage": 1e-200}, {"drift": 1e200}])
+def test_numbers_without_a_solution_are_refused(extreme: dict[str, float]) -> None:
+    with pytest.raises(rds.InputError, match="there are no gains for .* choose numbers"):
+        law(0.0, **extreme)
+
+
 def test_the_covariance_stays_the_same_from_sample_to_sample() -> None:
     """That of a position, mm², is many powers of ten smaller than that of a drift, V²: rounding must not reach it."""
     options = {"disturbance": 0.0, "drift": 187.0, "noise": 1.2e-5}
