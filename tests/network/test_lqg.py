@@ -65,7 +65,7 @@ def test_gain_and_filter_are_those_of_python_control() -> None:
 
 @pytest.mark.parametrize("extreme", [{"error": 1e-300}, {"voltage": 1e-200}, {"drift": 1e200}])
 def test_numbers_without_a_solution_are_refused(extreme: dict[str, float]) -> None:
-    with pytest.raises(rds.InputError, match="there are no gains for .* choose numbers"):
+    with pytest.raises(rds.InputError, match=r"there are no gains for .* choose numbers"):
         law(0.0, **extreme)
 
 
