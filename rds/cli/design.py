@@ -13,6 +13,7 @@ from rds.cli.common import Json, print_json, refusals, writes_files
 
 if TYPE_CHECKING:
     from rds.identification.fit.design import Linear
+    from rds.machines import Machine
 
 app = typer.Typer(
     no_args_is_help=True, help="Controllers designed from a fitted model, for a loop with delay, or by a relay."
@@ -28,10 +29,14 @@ def tracking(
     model: Annotated[Path | None, typer.Argument(help="A model file, as `rds fit -o` writes it.")] = None,
     axis: Annotated[str | None, typer.Option(help="Instead of a model file: an axis by its machine's data.")] = None,
     machine: Annotated[str | None, typer.Option(help="The machine of --axis (default mini-cnc).")] = None,
-    sample_period: Annotated[float, typer.Option(help="Of the loop, s.")] = 0.001,
+    sample_period: Annotated[
+        float | None, typer.Option(help="Of the loop, s (default: that of the machine of --axis, else 0.001).")
+    ] = None,
     poles: Annotated[str, typer.Option(help="Two poles of the error, 1/s.")] = "-32+24j,-32-24j",
     observer_pole: Annotated[float, typer.Option(help="Of the velocity's observer, 1/s.")] = -320.0,
-    voltage_range: Annotated[float, typer.Option(help="Of the converter, ± V.")] = 10.0,
+    voltage_range: Annotated[
+        float | None, typer.Option(help="Of the converter, ± V (default: that of the machine of --axis, else 10).")
+    ] = None,
     json: Json = False,
 ) -> None:
     """The general tracking controller with its observer, as a file of your own."""
@@ -41,14 +46,15 @@ def tracking(
 
         if voltage_range == inf:
             raise InputError("--voltage-range = inf V must be a finite number; a converter has a range")
-        designed = _axis(model, axis, machine)
+        designed, on = _axis(model, axis, machine)
+        period, volts = (0.001, 10.0) if on is None else (on.sample_period, on.converter.range)
         write_tracking(
             out,
             designed,
-            sample_period=sample_period,
+            sample_period=period if sample_period is None else sample_period,
             poles=_poles(poles),
             observer_pole=observer_pole,
-            voltage_range=voltage_range,
+            voltage_range=volts if voltage_range is None else voltage_range,
         )
     _warn(model, designed.doubts)
     if json:
@@ -133,7 +139,8 @@ def relay(
     typer.echo(found.table() if out is None else f"wrote {out}")
 
 
-def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:
+def _axis(model: Path | None, axis: str | None, machine: str | None) -> tuple[Linear, Machine | None]:
+    """What is designed for, and the machine that it is an axis of where that was named."""
     from rds.core.errors import InputError
     from rds.identification.fit.design import linear_axis_of, linear_axis_of_machine
     from rds.machines import load_machine
@@ -143,8 +150,9 @@ def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:
     if model is not None:
         if machine is not None:
             raise InputError("--machine is for --axis; a model file says what the axis is")
-        return linear_axis_of(model)
-    return linear_axis_of_machine(load_machine("mini-cnc" if machine is None else machine), str(axis))
+        return linear_axis_of(model), None
+    on = load_machine("mini-cnc" if machine is None else machine)
+    return linear_axis_of_machine(on, str(axis)), on
 
 
 def _warn(model: Path | None, doubts: Iterable[str]) -> None:

@@ -20,6 +20,8 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
+from rds.core.errors import InputError
+from rds.core.quantities import listed
 from rds.core.registry import Registry
 from rds.core.types import Controller
 
@@ -71,4 +73,9 @@ def library_controller(
     whose `unit` is "rev/min" is a spindle: first order, its speed measured. Options not given are tuned from
     `tau`, `K` and `T`. Raises InputError for an unknown name or option, or a value that will not do.
     """
-    return LIBRARY.module(name).make(axis_model, T, converter_range, unit=unit, **options)
+    try:
+        return LIBRARY.module(name).make(axis_model, T, converter_range, unit=unit, **options)
+    except ArithmeticError as error:
+        numbers = listed(options | {key: axis_model[key] for key in ("tau", "K") if key in axis_model})
+        said = f"controller {name!r} cannot be computed with numbers so large or so small: {numbers}"
+        raise InputError(f"{said}; give others") from error

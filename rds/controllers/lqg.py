@@ -20,8 +20,9 @@ from typing import Any
 
 from rds.controllers.axis_data import axis_data, check_delayed
 from rds.controllers.lqg_design import Design, designed
+from rds.core.errors import InputError
 from rds.core.options import read_options
-from rds.core.quantities import Quantity
+from rds.core.quantities import Quantity, listed
 from rds.core.types import NOT_LIVE, Controller, Reference, Source
 
 NAME = "lqg"
@@ -83,7 +84,12 @@ def make(
     given = DEFAULTS | read_options(options, OPTIONS, owner)
     axis = axis_data(axis_model, T, converter_range, unit, owner)
     check_delayed(axis, given["delay"], owner)
-    design = designed(axis.tau, axis.K, T, converter_range, given)
+    try:
+        design = designed(axis.tau, axis.K, T, converter_range, given)
+    except (ArithmeticError, ValueError) as error:  # ValueError: scipy's, of an equation without a solution
+        numbers = listed({name: given[name] for name in OPTIONS})
+        said = f"{owner}: there are no gains for {numbers}, tau = {axis.tau:g} s and K = {axis.K:g}"
+        raise InputError(f"{said}; choose numbers that are less far from each other") from error
     start = (0.0, 0.0, 0.0, 0.0, 0.0, *design.covariance, *[0.0] * (REMEMBERED + design.whole + 2))
     params = {**given, "gains": list(design.gain), "design": design}
     signals = {"velocity": f"{unit}/s", "disturbance": "V"}

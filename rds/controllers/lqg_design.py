@@ -117,7 +117,8 @@ def designed(tau: float, K: float, T: float, limit: float, options: Mapping[str,
     process = gramian(augmented, intensity, T)
     n = 3 if has_drift else 2
     step, seen = np.block([[Phi, Gamma], [np.zeros((1, 2)), np.ones((1, 1))]])[:n, :n], np.eye(1, n)
-    jitter = 1e-12 * np.eye(n) * max(np.trace(process), 1e-12)  # so that the equation has a solution without noise
+    # so that the equation has a solution without noise; of each state by itself, whose units differ
+    jitter = 1e-12 * np.diag(np.maximum(np.diag(process)[:n], 1e-12))
     predicted = np.zeros((3, 3))
     predicted[:n, :n] = solve_discrete_are(
         step.T, seen.T, process[:n, :n] + jitter, np.array([[options["noise"] ** 2]])

@@ -88,6 +88,10 @@ class Interpolator:
                 raise self._broken(f"has yielded {most} rows of a segment of {whole:g} mm, and no end")
         if way < _LEAST_SHARE * whole and whole > _POINT:  # a full circle that is taken for a line is over at once
             kind = "an arc" if isinstance(segment, ArcSegment) else "a line"
+            if expected <= 1.0:
+                said = f"{kind} of {whole:g} mm takes {expected:.2g} sample periods at {segment.feed_rate:g} mm/s"
+                remedy = "lower the feed rate, or shorten the sample period"
+                raise InputError(f"{said}, and {self.name} goes {way:g} mm of it; {remedy}")
             raise self._broken(
                 f"has gone {way:g} mm of {kind} of {whole:g} mm: go all of it, or raise a ValueError for what it does "
                 "not handle"

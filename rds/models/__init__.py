@@ -10,7 +10,9 @@ from __future__ import annotations
 from types import ModuleType
 from typing import Any
 
+from rds.core.errors import InputError
 from rds.core.face import face
+from rds.core.quantities import listed
 from rds.core.registry import Registry
 from rds.core.types import Model
 
@@ -51,4 +53,8 @@ def library_model(name: str, **params: Any) -> Model:
 
     Raises InputError for an unknown name or parameter, or a value that will not do.
     """
-    return LIBRARY.module(name).make(**params)
+    try:
+        return LIBRARY.module(name).make(**params)
+    except ArithmeticError as error:
+        said = f"model {name!r} cannot be computed with numbers so large or so small: {listed(params)}"
+        raise InputError(f"{said}; give others") from error

@@ -39,7 +39,7 @@ PARAMETERS = {
     "stribeck": Quantity("extra friction at standstill, as a fraction of that at high speed", low=0.0),
     "stribeck_velocity": Quantity("speed at which it has gone", "mm/s", above=0.0),
     "backlash": Quantity("play between motor and encoder, its whole width", "mm", low=0.0),
-    "delay": Quantity("time from the command frame to the amplifier's output", "s", low=0.0),
+    "delay": Quantity("time from the command frame to the amplifier's output", "s", 0.0, 1000.0),
     "offset": Quantity("what the amplifier adds to the voltage", "V"),
     "dead_zone": Quantity("half width of the dead zone: smaller voltages do nothing", "V", low=0.0),
 }

@@ -22,7 +22,7 @@ PARAMETERS = {
     "tau": Quantity("time constant", "s", above=0.0),
     "K": Quantity("gain", "(rev/min)/V"),
     "offset": Quantity("voltage that acts beside the command", "V"),
-    "delay": Quantity("dead time from a command to its effect", "s", low=0.0),
+    "delay": Quantity("dead time from a command to its effect", "s", 0.0, 1000.0),
 }
 _NEUTRAL = {"offset": 0.0, "delay": 0.0}
 

@@ -24,6 +24,8 @@ LINES = ("all", "odd")
 _MOST_LINES = 2000
 _HIGHEST = 1e6  # multiple: the peak is looked for in a whole base period, with some points for each oscillation
 _PER_PERIOD = 16  # points of the fastest sinusoid's period at which the peak is looked for
+_BESIDE = 0.98  # of the peak: what a point beside it has at least, cos(π/16)
+_NEWTON = 4  # steps
 OPTIONS: Mapping[str, Declaration] = {
     "amplitude": Quantity("middle to peak", "V or mm", low=0.0),
     "frequency": Quantity("the base frequency, of which all others are multiples", "Hz", above=0.0),
@@ -61,12 +63,11 @@ def multisine(
             f"{settings['lowest']:g} and {settings['highest']:g} Hz; it takes 1 to {_MOST_LINES}: change `frequency`"
         )
     phases = -np.pi * np.arange(len(multiples)) * np.arange(1, len(multiples) + 1) / len(multiples)
-    t = np.arange(_PER_PERIOD * int(multiples[-1])) / (_PER_PERIOD * multiples[-1] * base)
-    peak = float(np.abs(_sum(t, 2.0 * np.pi * base * multiples, phases, 0)).max())
+    omegas = 2.0 * np.pi * base * multiples
     motion = partial(
         _multisine,
-        size=settings["amplitude"] / peak,
-        omegas=2.0 * np.pi * base * multiples,
+        size=settings["amplitude"] / _peak(omegas, phases, _PER_PERIOD * int(multiples[-1])),
+        omegas=omegas,
         phases=phases,
         offset=settings["offset"],
     )
@@ -98,6 +99,18 @@ def _sum(t: np.ndarray, omegas: np.ndarray, phases: np.ndarray, derivative: int)
     for omega, phase in zip(omegas, phases, strict=True):  # not one table of all: samples times lines may be 10^8
         total += omega**derivative * np.sin(omega * t + phase + 0.5 * np.pi * derivative)
     return total
+
+
+def _peak(omegas: np.ndarray, phases: np.ndarray, points: int) -> float:
+    """The largest value of the sum in a period: Newton's method, from those of so many points that may be beside it."""
+    step = 2.0 * np.pi / (_PER_PERIOD * omegas[-1])
+    t = np.arange(points) * step
+    values = np.abs(_sum(t, omegas, phases, 0))
+    t = t[values >= _BESIDE * values.max()]
+    for _ in range(_NEWTON):
+        slope, bend = _sum(t, omegas, phases, 1), _sum(t, omegas, phases, 2)
+        t = t - np.clip(slope / np.where(bend == 0.0, np.inf, bend), -step, step)
+    return float(max(values.max(), np.abs(_sum(t, omegas, phases, 0)).max()))
 
 
 def _multisine(t: np.ndarray, size: float, omegas: np.ndarray, phases: np.ndarray, offset: float) -> Motion:

@@ -104,7 +104,8 @@ def _check_motion(table: np.ndarray, numbers: list[int], file: str | Path) -> No
         rates = table[:, column + 1]
         mean = np.diff(table[:, column]) / dt
         low, high = np.minimum(rates[:-1], rates[1:]), np.maximum(rates[:-1], rates[1:])
-        bends = np.abs(table[:, 3]) if column == 1 else np.zeros(len(table))
+        slopes = np.abs(np.diff(rates) / dt)  # of an acceleration: between two rows beside its peak the mean is higher
+        bends = np.abs(table[:, 3]) if column == 1 else np.maximum(np.append(slopes, 0.0), np.insert(slopes, 0, 0.0))
         slack = (bends[:-1] + bends[1:]) * dt / 2.0 + (high - low) / 2.0
         slack += _ROUNDING * (np.abs(rates).max() + 2.0 * np.abs(table[:, column]).max() / dt)
         wrong = np.flatnonzero((mean < low - slack) | (mean > high + slack))

@@ -68,3 +68,8 @@ def test_gains_change_while_it_runs_and_keep_the_lead() -> None:
 def test_a_lead_that_cannot_be_is_refused(lead: float, said: str) -> None:
     with pytest.raises(InputError, match=rf"lead = .*{said}"):
         library_controller("zero-phase", axis_model("X"), T, RANGE, lead=lead)
+
+
+def test_an_axis_that_nothing_can_be_computed_with_is_refused() -> None:
+    with pytest.raises(InputError, match=r"'zero-phase' cannot be computed .* K = 1e\+300"):
+        library_controller("zero-phase", {"tau": 0.01, "K": 1e300}, 0.001, 10.0, gains=[1.0, 1.0])

@@ -178,3 +178,9 @@ def test_names_and_options_that_there_are_not() -> None:
 
 def test_keyhole_is_a_chain() -> None:
     assert all(a.end == b.start for a, b in pairwise(KEYHOLE))
+
+
+def test_a_circle_that_is_gone_round_within_a_sample_is_told_by_its_feed() -> None:
+    tiny = ArcSegment((0.0, 0.0), (0.0, 0.0), (0.02, 0.0), 200.0)  # 0.126 mm, and 0.2 mm in a sample
+    with pytest.raises(InputError, match=r"an arc of 0\.125664 mm takes 0\.63 sample periods .* lower the feed rate"):
+        interpolate([tiny], 0.001)

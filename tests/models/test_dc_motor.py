@@ -101,3 +101,8 @@ def test_a_run_records_the_current_and_the_cascade_limits_it():
 def test_missing_parameters_are_named():
     with pytest.raises(InputError, match=r"dc-motor-axis needs torque_constant \(torque constant k.*N m/A\)"):
         library_model("dc-motor-axis", resistance=1.0)
+
+
+def test_numbers_that_nothing_can_be_computed_with_are_refused() -> None:
+    with pytest.raises(InputError, match=r"cannot be computed .* torque_constant = 1e-300"):
+        library_model("dc-motor-axis", resistance=1.0, torque_constant=1e-300, inertia=1.0, lead=1.0)

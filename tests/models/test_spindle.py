@@ -68,3 +68,9 @@ def test_unknown_model_lists_the_known_ones():
         library_model("lathe")
     own = ["linear-axis", "spindle", "machine-axis", "directional-axis"]
     assert set(model_names()) == {*own, "position-drive", "profile-drive", "dc-motor-axis"}
+
+
+@pytest.mark.parametrize("name", ["spindle", "machine-axis"])
+def test_a_delay_that_would_fill_the_memory_is_refused(name: str) -> None:
+    with pytest.raises(InputError, match=r"delay = 1000000\.0 must be from 0 to 1000 s"):
+        library_model(name, tau=0.1, K=300.0, delay=1e6)

@@ -14,12 +14,14 @@ T = 0.002  # s
 
 @given(goal=st.floats(-20, 20), speed=st.floats(0.5, 15), acceleration=st.floats(5, 500))
 def test_it_reaches_its_goal_within_its_limits(goal: float, speed: float, acceleration: float) -> None:
-    x, v = 0.0, 0.0
+    x, v, way = 0.0, 0.0, 0.0
     for _ in range(round((abs(goal) / speed + 2 * speed / acceleration + 0.1) / T) + 2000):
-        before = v
+        before, last, here = v, way, x
         x, v = advance(x, v, goal, speed, acceleration, T)
+        way = x - here
         assert abs(v) <= speed * (1 + 1e-9)
         assert abs(v - before) <= 2 * acceleration * T * (1 + 1e-9)  # the last sample may end two at once
+        assert abs(way - last) <= acceleration * T * T * (1 + 1e-6) + 1e-14
         assert min(0.0, goal) - 1e-9 <= x <= max(0.0, goal) + 1e-9
     assert (x, v) == (goal, 0.0)
 

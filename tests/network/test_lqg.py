@@ -63,6 +63,20 @@ def test_gain_and_filter_are_those_of_python_control() -> None:
     assert design.gain[0] == pytest.approx(plain[0, 0], rel=0.2)  # whose cost is of the instants only
 
 
+@pytest.mark.parametrize("extreme", [{"error": 1e-300}, {"voltage": 1e-200}, {"drift": 1e200}])
+def test_numbers_without_a_solution_are_refused(extreme: dict[str, float]) -> None:
+    with pytest.raises(rds.InputError, match=r"there are no gains for .* choose numbers"):
+        law(0.0, **extreme)
+
+
+def test_the_covariance_stays_the_same_from_sample_to_sample() -> None:
+    """That of a position, mm², is many powers of ten smaller than that of a drift, V²: rounding must not reach it."""
+    options = {"disturbance": 0.0, "drift": 187.0, "noise": 1.2e-5}
+    design = library_controller("lqg", {"tau": 0.096, "K": 1.66}, 0.0005, inf, **options).params["design"]
+    _, corrected = design.corrected((0.0, 0.0, 0.0), design.covariance, 0.0)
+    assert design.spread(corrected) == pytest.approx(design.covariance, rel=1e-4)
+
+
 @pytest.mark.parametrize("delay", [0.0007, 0.002, 0.0113])
 def test_a_known_delay_leaves_the_poles_where_they_are(delay: float) -> None:
     """Separation: with the predictor, the poles that are not 0 are those of the regulator and of the filter."""

@@ -263,6 +263,12 @@ def test_the_extremes_of_an_arc_stay_within_the_travel(turned: float) -> None:
         in_room([ArcSegment(begin, begin, (0.0, 0.0), 5.0)], [7], load_machine("mini-cnc"), ["X", "Y"])
 
 
+def test_pulses_of_a_coarse_unit_are_no_leaps(here: Path) -> None:
+    """One BLU of 0.05 mm in a sample of 1 ms is 50 mm/s, and the axes move at 13 mm/s: the feed of 10 mm/s is kept."""
+    result = follow(interpolator="reference-pulse", params={"blu": 0.05}).run()
+    assert result.meta["ending"] == "done" and result.meta["program"]["path_error"]["max"] < 0.05
+
+
 def test_a_fault_is_told_with_the_line_and_the_time(here: Path) -> None:
     failing = follow(file="lines.toml", interpolator="mine.py", params={"fails": 300})
     with pytest.raises(ContractError, match=r"mine\.py, line 12.*my own zero.*t = 0\.\d+ s"):

@@ -208,6 +208,21 @@ def test_the_command_line_writes_the_same_file(tmp_path: Path) -> None:
         assert CliRunner().invoke(app, ["design", "tracking", "-o", str(there), *bad]).exit_code == 2
 
 
+def test_the_command_takes_period_and_range_of_the_machine(tmp_path: Path) -> None:
+    from typer.testing import CliRunner
+
+    from rds.cli.main import app
+    from rds.core.load import load_student
+
+    there = tmp_path / "law.py"
+    for words, period, volts in (("A mrmt-oacs", 0.001, 12.0), ("X starmill", 0.01, 10.0)):
+        axis, machine = words.split()
+        ran = CliRunner().invoke(app, ["design", "tracking", "--axis", axis, "--machine", machine, "-o", str(there)])
+        assert ran.exit_code == 0, ran.output
+        law = load_student(there)
+        assert (law.sample_period, law.params["limit"]) == (period, volts)
+
+
 def test_the_document_s_python_says_what_it_says(capsys: pytest.CaptureFixture[str]) -> None:
     (block,) = (each for each in blocks("docs/design.md") if each.language == "python")
     exec(compile(block.text, "docs/design.md", "exec"), {})

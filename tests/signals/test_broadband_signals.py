@@ -25,6 +25,12 @@ def test_a_multisine_holds_its_lines_and_no_others(base: float, first: int, coun
     assert there.tolist() == expected
     np.testing.assert_allclose(size[there], size[there][0], rtol=1e-9)
     assert np.abs(u).max() == pytest.approx(5.0, rel=0.02)
+    assert np.abs(u).max() <= 5.0 * (1.0 + 1e-9)
+
+
+def test_a_multisine_reaches_its_amplitude_and_no_more() -> None:
+    fine = np.linspace(0.0, 1.0 / 1.5, 40001)
+    assert np.abs(multisine(10.0, 1.5, 1.5, 16.5).value(fine)).max() == pytest.approx(10.0, rel=1e-6)
 
 
 def test_schroeder_s_phases_keep_the_peak_low() -> None:

@@ -119,6 +119,14 @@ def test_a_trapezoidal_profile_belongs_together_though_its_acceleration_jumps(tm
     user(file=write(tmp_path, "0,0,0,10\n0.1,0.05,1,10\n0.2,0.15,1,0\n0.3,0.25,1,0\n0.4,0.3,0,-10\n"))
 
 
+def test_rows_to_either_side_of_the_peak_of_an_acceleration_belong_together(tmp_path):
+    """Ten rows a period: between those beside the peak the acceleration is higher than at both."""
+    t = 0.01 * np.arange(-0.5, 30)
+    wave = np.sin(20 * np.pi * t + np.pi / 2)
+    rows = np.column_stack((t, wave, 20 * np.pi * np.cos(20 * np.pi * t + np.pi / 2), -((20 * np.pi) ** 2) * wave))
+    user(file=write(tmp_path, "\n".join(",".join(map(repr, row)) for row in rows.tolist())))
+
+
 @pytest.mark.parametrize(
     "text, line, fault",
     [

@@ -39,7 +39,7 @@ _WORTH = 1.02  # times the rate now, that a higher one must be
 _ROUND = 100.0  # a rate above 1 that is not the wanted one is a whole number of per cent
 _FILLS = 2  # rows that are made at a sample beside those that are passed, for a rate above 1
 _FASTEST = 1.5  # times an axis's velocity that a row may ask for: the drive would follow, and nobody meant it
-_ROUNDED = 0.02  # mm or degrees that rounding to BLU may add to a row
+_ROUNDED = 0.02  # mm or degrees that rounding to BLU may add to a row, or two of the BLU where that is more
 _BEYOND = 1e-6  # mm that the last digits of a path may lie beyond the travel
 _ROTARY = "ABC"
 _UNKNOWN = 1 << 50  # samples: the end is not in sight
@@ -61,7 +61,7 @@ class Interpolated(VariableRate):
         self._ahead = program.ahead
         self._bounds: deque[float] | None = None  # of the rows: what the rate may be; kept while more than 1 is wanted
         self._ways: dict[tuple[float, float], tuple[Ramp, int]] = {}
-        self._longest = (_FASTEST * velocity * T + _ROUNDED).tolist()
+        self._longest = (_FASTEST * velocity * T + max(_ROUNDED, 2.0 * program.blu)).tolist()
         self._travel = [(low - _BEYOND, high + _BEYOND) for low, high in program.travel.tolist()]
         # s and s² that a change of the rate by 1 takes at the largest feed, of the weakest axis
         slow, sharp = program.feed / float(acceleration.min()), program.feed / float(jerk.min())

@@ -97,7 +97,8 @@ class InterpolatedProgram:
     due, and goes through the `stretches`. `line` has the program line of each segment; `feed` is the largest rate along
     the path, mm/s. `ahead` rows are made before they are needed. `samples` is how many it takes at the programmed
     feed, as far as that is known before the rows are made. `travel` (n × 2) is where the axes may go. `path` is the
-    programmed path, rows of `SEGMENT`, for measuring; `about` says what made the rows, for the result.
+    programmed path, rows of `SEGMENT`, for measuring; `about` says what made the rows, for the result. `blu` is the
+    unit (mm) in which their positions are whole, 0 where they are not.
     """
 
     axes: tuple[str, ...]
@@ -116,6 +117,7 @@ class InterpolatedProgram:
     about: dict[str, Any]
     notes: tuple[str, ...] = ()
     name: str = ""
+    blu: float = 0.0
 
 
 def dwell_samples(seconds: float, T: float) -> int:

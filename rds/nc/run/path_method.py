@@ -99,6 +99,7 @@ def program_of(
             "look_ahead": method.ahead,
         },
         name=name,
+        blu=blu or 0.0,
     )
 
 
