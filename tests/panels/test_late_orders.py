@@ -73,9 +73,12 @@ def test_what_was_pressed_while_the_kernel_stood_still_moves_nothing_when_it_com
         assert page.evaluate("window.sent") == ["settle", "late"]
     page.evaluate("window.sent = []")
     press(500, HOME, STOP)  # nothing that was pressed before Stop comes after it
+    page.locator(HOME).evaluate("(button) => button.classList.remove('rds-order')")
+    page.locator('.rds-group:has-text("Motion") input').first.press("End")
+    press(500, HOME, STOP)  # nor what the page does not know yet to be an order: Run, after another mode was chosen
     press(500, STEP)
     page.wait_for_function("window.sent.includes('step')")
-    assert page.evaluate("window.sent") == ["settle", "click", "settle", "go", "step"]
+    assert page.evaluate("window.sent") == ["settle", "click", "settle", "click", "settle", "go", "step"]
     page.evaluate("window.sent = []")
     page.locator('.rds-group:has-text("Motion") input').first.press("End")  # a field that may have made an order of it
     press(500, '.rds-nav button:text-is("Jog")')
