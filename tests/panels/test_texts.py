@@ -149,6 +149,16 @@ def test_values_and_parts_are_put_where_they_belong(exchange: Callable[..., Any]
             "Zeit ungültig: der Rechner war ausgelastet (3 von 250 Abtastschritten verspätet, 2 Perioden verworfen). "
             "Das sagt nichts über Ihren Code. Auf einem ruhigeren Rechner wiederholen",
         ),
+        (
+            "your drawing: reaches the border of the drawing at row 1, column 3: its outline is open there; "
+            "leave an empty row or column around the shape",
+            "Ihre Zeichnung: reicht bis an den Rand der Zeichnung bei Zeile 1, Spalte 3: dort ist der Umriss offen; "
+            "um die Form eine Zeile oder Spalte leer lassen",
+        ),
+        (
+            "1 lines, 0 arcs, 50.04 mm, 10.0 s at the feed; X 0 to 40, Y 0 to 30, Z -2 to 0 mm",
+            "1 Geraden, 0 Bögen, 50.04 mm, 10.0 s im Vorschub; X 0 bis 40, Y 0 bis 30, Z -2 bis 0 mm",
+        ),
     ],
 )
 def test_a_verdict_is_in_the_language_with_its_numbers(reason: str, put: str) -> None:
