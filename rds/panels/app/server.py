@@ -114,7 +114,7 @@ class KernelSocket(VoilaKernelWebsocketHandler):
 
 
 class KernelStays(APIHandler):
-    """A page that goes asks for the end of its kernel: a kernel ends later (see `PanelsServer`), and that is no fault."""
+    """A page that goes asks for the end of its kernel, which comes later (see `PanelsServer`): that is no fault."""
 
     @web.authenticated
     async def post(self, kernel_id: str) -> None:
