@@ -88,6 +88,25 @@ def test_a_file_that_somebody_else_changed_is_not_written_over(tmp_path: Path) -
     assert text.text == "(theirs)\nM2\n"
 
 
+def test_what_was_found_of_another_text_is_not_said_of_one_whose_draft_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, data: bytes) -> None:
+        raise InputError("cannot write: No space left on device", str(path))
+
+    made = program(tmp_path, "G0 X1", "M2")
+    assert looked(made).ok
+    monkeypatch.setattr("rds.panels.program.text.write_whole", full)
+    with pytest.raises(InputError, match="No space left"):
+        made.edit("G0 X1000\nM2\n")
+    assert "the check failed" in looked(made).sentence
+    with pytest.raises(InputError, match="it cannot run yet"):
+        made.run()
+    monkeypatch.undo()
+    made.look_again()
+    assert "X" in looked(made).sentence and not looked(made).ok
+
+
 def test_a_file_that_was_replaced_is_read_again_unless_something_is_unsaved(tmp_path: Path) -> None:
     path = tmp_path / "part.ngc"
     path.write_text("M2\n")
