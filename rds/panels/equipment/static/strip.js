@@ -107,7 +107,7 @@ function render({ model, el }) {
       const of = traces.flatMap((trace, k) => (trace.scale === lane ? [k] : []));
       const isLast = i === lanes.length - 1, height = Math.max(room * weights[i] / sum, LOWEST);
       const axes = [{ stroke: text, grid, label: isLast ? say("time [s]") : undefined, labelSize: isLast ? 18 : 0, size: isLast ? AXIS - 2 : 4, values: isLast ? undefined : (u, shown) => shown.map(() => "") },
-        { scale: "y", stroke: text, grid, size: 58, labelSize: 18, label: axisLabel(of.map((k) => traces[k]), height), space: 22 }];
+        { scale: "y", stroke: text, grid, size: 58, labelSize: 18, label: axisLabel(of.map((k) => traces[k]), height), space: 18 }];
       const series = [{ label: "time [s]", value: (u, v) => (v == null ? "–" : v.toFixed(3)) }];
       of.forEach((k) => series.push({
         label: `${traces[k].name} [${traces[k].unit}]`, stroke: traces[k].color, width: traces[k].width || 1.6, dash: traces[k].dash || [],
