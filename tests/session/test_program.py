@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.core.types import Ending
-from rds.machines import machine_names
+from rds.machines import load_machine, machine_names
 from rds.nc.active import Follower, modes_at
 from rds.nc.validation import Validation
 from rds.panels.interpolator.motion import MADE
@@ -22,6 +22,7 @@ from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
 from rds.panels.program.mdi import FILE, Mdi
 from rds.panels.program.offsets import Offsets
+from rds.panels.program.path_view import PathView
 from rds.panels.program.preview import _numbers
 from rds.panels.program.state import Program
 from rds.panels.program.text import ProgramText
@@ -45,6 +46,11 @@ def looked(made: Program) -> Look:
         time.sleep(0.005)
     assert made.latest is not None
     return made.latest
+
+
+def test_the_path_is_seen_first_in_a_plane_of_the_machines_axes() -> None:
+    sides = {name: PathView(load_machine(name)).side for name in machine_names()}
+    assert sides["lathe"] == sides["mrm-lathe"] == "ZX" and {*sides.values()} == {"XY", "ZX"}
 
 
 # the text
