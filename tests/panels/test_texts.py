@@ -20,6 +20,7 @@ from rds.panels.interpolator.fields import Rows
 from rds.panels.kit.field import FieldView
 from rds.panels.page import language
 from rds.panels.page.shell import Shell
+from rds.panels.program.words import words
 from rds.panels.registry import PANELS
 from rds.panels.session import Session
 from rds.panels.session.choices import Choices
@@ -106,6 +107,7 @@ def test_every_text_of_every_panel_is_in_the_file(code: str, exchange: Callable[
     fields = {repr(each): each for each in fields_of(shell.session) if not isinstance(each, Rows)}
     views = [FieldView(Choices([field]), field.name) for field in fields.values()]
     said = {" ".join(text.split()) for each in (shell.widget, *shell.panels.values(), *views) for text in said_by(each)}
+    said |= {word["info"] for word in words()}  # of the editor of part programs
     known = {*machine_names(), *library(), shell.session.machine, str(tmp_path), "English", *languages().values()}
     said = {text for text in said if re.search(r"[^\W\d_]{2}", text) and text not in known and not NAME.fullmatch(text)}
     found = dict(zip(sorted(said), exchange(code, sorted(said)), strict=True))
