@@ -15,6 +15,7 @@ import pytest
 from rds.controllers import controller_names
 from rds.machines import load_machine, machine_names
 from rds.machines.library import library
+from rds.panels.code.completions import words as completions
 from rds.panels.equipment.fields import first_fields, parameter_fields, signal_fields
 from rds.panels.interpolator.fields import Rows
 from rds.panels.kit.field import FieldView
@@ -107,7 +108,13 @@ def test_every_text_of_every_panel_is_in_the_file(code: str, exchange: Callable[
     fields = {repr(each): each for each in fields_of(shell.session) if not isinstance(each, Rows)}
     views = [FieldView(Choices([field]), field.name) for field in fields.values()]
     said = {" ".join(text.split()) for each in (shell.widget, *shell.panels.values(), *views) for text in said_by(each)}
-    said |= {word["info"] for word in words()}  # of the editor of part programs
+    said |= {word["info"] for word in words()}  # of the editor of part programs, and of those of code
+    said |= {
+        word["info"]
+        for role in ("controller", "model", "interpolator")
+        for word in completions(role, ())
+        if not word["info"].startswith("import ")
+    }
     known = {*machine_names(), *library(), shell.session.machine, str(tmp_path), "English", *languages().values()}
     said = {text for text in said if re.search(r"[^\W\d_]{2}", text) and text not in known and not NAME.fullmatch(text)}
     found = dict(zip(sorted(said), exchange(code, sorted(said)), strict=True))
