@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from rds.panels.equipment import strip as live_strip
 from tests.panels.conftest import App, begin_with
 
 FAULTY = "def control(t, r, y, state, params):\n    error = r.positoin - y\n    return 10.0 * error, state\n"
@@ -393,3 +394,13 @@ def test_two_axes_follow_a_circle_under_one_controller(at: Callable[..., Equipme
     assert control.page.locator(".rds-figure:visible").count() == 2  # the path, and the axes over time
     control.choose("System", "X axis")
     assert not control.field("One controller for all axes").count()
+
+
+def test_numbers_at_the_axes_of_the_strip_are_those_of_the_page_in_every_browser(new_page: Callable[..., Any]) -> None:
+    """uPlot's own are as the browser's language has them: 1.500 and 0,3 in a German one."""
+    script = (Path(live_strip.__file__).parent / "static" / "strip.js").read_text(encoding="utf-8")
+    page = new_page(400, 300)
+    page.set_content("<html></html>")
+    page.add_script_tag(content=script.replace("export default", "window.made =") + "\nwindow.plain = plain;")
+    shown = page.evaluate("plain(null, [1500, 0.1 + 0.2, -2.5, 1e-4, null])")
+    assert shown == ["1500", "0.3", "-2.5", "0.0001", None]

@@ -12,16 +12,22 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.modes import mode_names
+from rds.panels.grading.panel import GradingView
 from rds.panels.jog.hold import HoldButtons
 from rds.panels.jog.panel import JogView
 from rds.panels.jog.state import Jog
 from rds.panels.jog.turn import TurnButtons
 from rds.panels.kit.button import run_order
+from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
+from rds.panels.machine.bus_view import BusView
+from rds.panels.machine.controllers_view import ControllersView
+from rds.panels.machine.state import MachineState
 from rds.panels.page.presence import Presence
 from rds.panels.page.shell import Shell
 from rds.panels.program.operator import Operator
-from rds.panels.program.state import program_choices
+from rds.panels.program.setup_view import SetupView
+from rds.panels.program.state import Program, program_choices
 from rds.panels.session import Session
 from rds.panels.session.choices import Choices
 from rds.panels.session.expired_orders import LATE
@@ -73,9 +79,12 @@ def test_what_was_pressed_while_the_kernel_stood_still_moves_nothing_when_it_com
         assert page.evaluate("window.sent") == ["settle", "late"]
     page.evaluate("window.sent = []")
     press(500, HOME, STOP)  # nothing that was pressed before Stop comes after it
+    page.locator(HOME).evaluate("(button) => button.classList.remove('rds-order')")
+    page.locator('.rds-group:has-text("Motion") input').first.press("End")
+    press(500, HOME, STOP)  # nor what the page does not know yet to be an order: Run, after another mode was chosen
     press(500, STEP)
     page.wait_for_function("window.sent.includes('step')")
-    assert page.evaluate("window.sent") == ["settle", "click", "settle", "go", "step"]
+    assert page.evaluate("window.sent") == ["settle", "click", "settle", "click", "settle", "go", "step"]
     page.evaluate("window.sent = []")
     page.locator('.rds-group:has-text("Motion") input').first.press("End")  # a field that may have made an order of it
     press(500, '.rds-nav button:text-is("Jog")')
@@ -204,3 +213,48 @@ def test_words_of_a_held_button_that_come_all_at_once_move_nothing(monkeypatch: 
             assert say(answer) == first + 2
         assert say(answers[-1]["number"]) == first + 3
         heard.clear()
+
+
+def test_nothing_moves_by_a_value_that_was_refused_and_stands_in_its_field(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shell = Shell(Session(tmp_path))
+    jog = Jog(shell.session)
+    for kind in ("go", "step", "turn"):
+        monkeypatch.setattr(jog, kind, lambda *_: pytest.fail("it moves, by the value before"))
+    view = JogView(shell, jog)
+
+    def type_in(field: FieldView, text: str) -> str:
+        view.notice.clear()
+        field.control.value = text
+        return f"first mend what is refused: {field.field.label}"
+
+    said = type_in(view._goal[1], "1.000,5")
+    view._go.click()
+    assert said in view.notice.value
+    said = type_in(view._motion["speed"], "fast")
+    view._holds["X"]._told(None, {"kind": "step", "direction": 1}, None)
+    assert said in view.notice.value
+    said = type_in(view._motion["spindle_speed"], "-1")
+    view._turns["spindle"]._told(None, {"kind": "turn", "direction": 1}, None)
+    assert said in view.notice.value
+
+
+def test_nothing_is_kept_or_sent_of_a_value_that_was_refused_and_stands_in_its_field(tmp_path: Path) -> None:
+    shell = Shell(Session(tmp_path))
+    review, state = GradingView(shell), MachineState(shell.session)
+    tuning, bus = ControllersView(shell, state), BusView(shell, state)
+    touch_off = SetupView(Program(shell.session), dict)
+    for field, act in (
+        (review._words["points"], review.review),
+        (tuning._tuning[1], tuning.tune),
+        (tuning._steps[0], tuning.step),
+        (bus._fields[0], bus.analyse),
+        (bus._filter, bus.listen),
+        (touch_off._views[1], touch_off._touch_off),
+    ):
+        field.control.value = "8 of 10"
+        if field is bus._filter:
+            field.control.value = "x" * 9999
+        with pytest.raises(InputError, match=f"first mend what is refused: {field.field.label}"):
+            act()

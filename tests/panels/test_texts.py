@@ -12,19 +12,28 @@ from typing import Any
 import ipywidgets as widgets
 import pytest
 
-from rds.machines import machine_names
+from rds.controllers import controller_names
+from rds.machines import load_machine, machine_names
 from rds.machines.library import library
+from rds.panels.code.completions import words as completions
+from rds.panels.equipment.fields import first_fields, parameter_fields, signal_fields
+from rds.panels.interpolator.fields import Rows
+from rds.panels.kit.field import FieldView
 from rds.panels.page import language
 from rds.panels.page.shell import Shell
+from rds.panels.program.words import words
 from rds.panels.registry import PANELS
 from rds.panels.session import Session
+from rds.panels.session.choices import Choices
+from rds.panels.session.fields import Field
 from rds.panels.texts import exchanger, languages, texts
+from rds.references import signal_kinds
 
 SCRIPT = Path(language.__file__).parent / "static" / "texts.js"
 APART = ("style", "code", "pre", "svg", "math")
 # names of files, machines, modules and examples are the same in every language, and so are words of G-code
 NAME = re.compile(
-    r"[\w./-]+\.(?:py|csv|ngc|toml|tbl|var)|G\d.*|[A-Z]|[-\d.]+( to [-\d.]+)? ?\S{0,8}|\S+@\S+|g[₁₂]|– \S+"
+    r"[\w./-]+\.(?:py|csv|ngc|toml|tbl|var)|G\d.*|[A-Z]|[-\d.]+( to [-\d.]+)? ?\S{0,8}|\S+@\S+|g[₁₂]|– \S+|cm|in|um"
 )
 
 
@@ -63,6 +72,20 @@ def said_by(widget: Any) -> Iterator[str]:
         yield from said_by(child)
 
 
+def fields_of(session: Session) -> Iterator[Field]:
+    """All fields of the panels, also those that come into sight when something else is chosen."""
+    for choices in session._choices.values():
+        yield from choices.fields.values()
+    machine = load_machine(session.machine)
+    for axis in machine.axes:
+        for kind in ("model", "control"):
+            yield from first_fields(kind, machine, axis)
+        for name in controller_names():
+            yield from parameter_fields(name, machine.axes[axis])
+        for shape in signal_kinds():
+            yield from signal_fields(shape, machine.axes[axis].unit)
+
+
 @pytest.fixture
 def exchange(new_page: Callable[..., Any]) -> Callable[[str, list[str]], list[str | None]]:
     """What the page makes of some texts in a language."""
@@ -82,7 +105,16 @@ def test_every_text_of_every_panel_is_in_the_file(code: str, exchange: Callable[
             shell.open(name)
     assert shell.on_code is not None
     shell.on_code()  # what is made once somebody looks at it
-    said = {" ".join(text.split()) for each in (shell.widget, *shell.panels.values()) for text in said_by(each)}
+    fields = {repr(each): each for each in fields_of(shell.session) if not isinstance(each, Rows)}
+    views = [FieldView(Choices([field]), field.name) for field in fields.values()]
+    said = {" ".join(text.split()) for each in (shell.widget, *shell.panels.values(), *views) for text in said_by(each)}
+    said |= {word["info"] for word in words()}  # of the editor of part programs, and of those of code
+    said |= {
+        word["info"]
+        for role in ("controller", "model", "interpolator")
+        for word in completions(role, ())
+        if not word["info"].startswith("import ")
+    }
     known = {*machine_names(), *library(), shell.session.machine, str(tmp_path), "English", *languages().values()}
     said = {text for text in said if re.search(r"[^\W\d_]{2}", text) and text not in known and not NAME.fullmatch(text)}
     found = dict(zip(sorted(said), exchange(code, sorted(said)), strict=True))
@@ -125,6 +157,16 @@ def test_values_and_parts_are_put_where_they_belong(exchange: Callable[..., Any]
             "your code. Repeat it on a quieter computer",
             "Zeit ungültig: der Rechner war ausgelastet (3 von 250 Abtastschritten verspätet, 2 Perioden verworfen). "
             "Das sagt nichts über Ihren Code. Auf einem ruhigeren Rechner wiederholen",
+        ),
+        (
+            "your drawing: reaches the border of the drawing at row 1, column 3: its outline is open there; "
+            "leave an empty row or column around the shape",
+            "Ihre Zeichnung: reicht bis an den Rand der Zeichnung bei Zeile 1, Spalte 3: dort ist der Umriss offen; "
+            "um die Form eine Zeile oder Spalte leer lassen",
+        ),
+        (
+            "1 lines, 0 arcs, 50.04 mm, 10.0 s at the feed; X 0 to 40, Y 0 to 30, Z -2 to 0 mm",
+            "1 Geraden, 0 Bögen, 50.04 mm, 10.0 s im Vorschub; X 0 bis 40, Y 0 bis 30, Z -2 bis 0 mm",
         ),
     ],
 )

@@ -20,6 +20,7 @@ from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.modes.loop.execution import State
 from rds.modes.loop.retimed import EXCESS
+from rds.nc.run.judge import worst_lines
 from rds.nc.run.prepare import prepare
 from rds.nc.run.report import findings, program_report, save_run
 from rds.nc.run.run import PartProgram, ProgramRun
@@ -140,6 +141,14 @@ def test_the_contour_error_is_the_distance_to_the_path(part: Path) -> None:
     assert 4 <= worst["line"] <= 9
     following = result.meta["program"]["following_error"]["X"]
     assert following["max"] == np.abs(result["X_reference"] - x).max()
+
+
+def test_the_line_of_the_largest_contour_error_is_the_one_that_the_list_of_lines_names(tmp_path: Path) -> None:
+    """At the corner it has begun line 4 and is still nearest to line 3, which it overshoots."""
+    (tmp_path / "corner.ngc").write_text("G21 G90 G94\nG1 X5 F700\nX0\nZ-5\nM30\n")
+    result = PartProgram(tmp_path / "corner.ngc", "lathe").run()
+    worst = result.meta["program"]["contour_error"]
+    assert (worst["line"], worst["max"], worst["time_s"]) == worst_lines(result, result["contour_error"], 1)[0]
 
 
 def test_metrics_are_of_motion_alone(part: Path) -> None:

@@ -19,7 +19,8 @@ KIND = Choice("kind", "Kind", "form of the signal", "sine", options={"sine": "Si
 
 
 @pytest.mark.parametrize(
-    ("written", "meant"), [("2.5", 2.5), (" 2,5 ", 2.5), ("2.5 mm", 2.5), ("1e1", 10.0), (7, 7.0), ("150", 150.0)]
+    ("written", "meant"),
+    [("2.5", 2.5), (" 2,5 ", 2.5), ("2.5 mm", 2.5), ("1e1", 10.0), ("25e−1", 2.5), (7, 7.0), ("150", 150.0)],
 )
 def test_numbers_are_read_as_people_write_them(written: str, meant: float) -> None:
     assert AMPLITUDE.check(written) == meant

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.core.types import Ending
-from rds.machines import machine_names
+from rds.machines import load_machine, machine_names
 from rds.nc.active import Follower, modes_at
 from rds.nc.validation import Validation
 from rds.panels.interpolator.motion import MADE
@@ -22,6 +22,7 @@ from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
 from rds.panels.program.mdi import FILE, Mdi
 from rds.panels.program.offsets import Offsets
+from rds.panels.program.path_view import PathView
 from rds.panels.program.preview import _numbers
 from rds.panels.program.state import Program
 from rds.panels.program.text import ProgramText
@@ -45,6 +46,11 @@ def looked(made: Program) -> Look:
         time.sleep(0.005)
     assert made.latest is not None
     return made.latest
+
+
+def test_the_path_is_seen_first_in_a_plane_of_the_machines_axes() -> None:
+    sides = {name: PathView(load_machine(name)).side for name in machine_names()}
+    assert sides["lathe"] == sides["mrm-lathe"] == "ZX" and {*sides.values()} == {"XY", "ZX"}
 
 
 # the text
@@ -86,6 +92,25 @@ def test_a_file_that_somebody_else_changed_is_not_written_over(tmp_path: Path) -
     assert path.read_text() == "(theirs)\nM2\n"
     text.discard()
     assert text.text == "(theirs)\nM2\n"
+
+
+def test_what_was_found_of_another_text_is_not_said_of_one_whose_draft_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, data: bytes) -> None:
+        raise InputError("cannot write: No space left on device", str(path))
+
+    made = program(tmp_path, "G0 X1", "M2")
+    assert looked(made).ok
+    monkeypatch.setattr("rds.panels.program.text.write_whole", full)
+    with pytest.raises(InputError, match="No space left"):
+        made.edit("G0 X1000\nM2\n")
+    assert "the check failed" in looked(made).sentence
+    with pytest.raises(InputError, match="it cannot run yet"):
+        made.run()
+    monkeypatch.undo()
+    made.look_again()
+    assert "X" in looked(made).sentence and not looked(made).ok
 
 
 def test_a_file_that_was_replaced_is_read_again_unless_something_is_unsaved(tmp_path: Path) -> None:

@@ -32,12 +32,13 @@ def judged(result: Result, prepared: Prepared) -> Result:
     state = result["program_state"].astype(int)
     is_reference = bool(prepared.about)  # then the commanded path is a subject of its own
     prepared = located(result, prepared)
-    error, line = contour(result, prepared, state)
+    error = contour(result, prepared, state)
+    line = result["program_line"].astype(int)  # that it was at, as in `worst_lines`
     columns = dict(result.columns)
     units = dict(result.units)
     columns["contour_error"], units["contour_error"] = error, "mm"
     if is_reference:
-        columns["path_error"], units["path_error"] = contour(result, prepared, state, "reference")[0], "mm"
+        columns["path_error"], units["path_error"] = contour(result, prepared, state, "reference"), "mm"
     moves = moving(result)
     on_path = moves & (state != State.HOME)
     linear = any(name in _LINEAR for name in prepared.program.axes)
@@ -62,7 +63,7 @@ def judged(result: Result, prepared: Prepared) -> Result:
             if (
                 found := worst(
                     np.abs(result[f"{name}_reference"] - result[f"{name}_measured"]),
-                    result["program_line"].astype(int),
+                    line,
                     moves,
                     result.units[f"{name}_measured"],
                 )
@@ -103,17 +104,17 @@ def located(result: Result | Mapping[str, np.ndarray], prepared: Prepared) -> Pr
 
 def contour(
     result: Result | Mapping[str, np.ndarray], prepared: Prepared, state: np.ndarray, of: str = "measured"
-) -> tuple[np.ndarray, np.ndarray]:
-    """Distance (mm) of each measured position to the path, and the program line that it is nearest to.
+) -> np.ndarray:
+    """Distance (mm) of each measured position to the path.
 
     `of` "reference": of each commanded position. `result` may be some of a run's rows, as columns; `state` is its
     `program_state`, as integers.
     """
     path, axes = prepared.path, prepared.program.axes
-    line = result["program_line"].astype(int)
+    error = np.zeros(len(state))
     if not len(path):
-        return np.zeros(len(line)), line
-    points, wanted = np.zeros((len(line), 6)), np.zeros((len(line), 6))
+        return error
+    points, wanted = np.zeros((len(state), 6)), np.zeros((len(state), 6))
     for i, name in enumerate(AXES):
         if name in axes:
             points[:, i], wanted[:, i] = result[f"{name}_{of}"], result[f"{name}_reference"]
@@ -125,12 +126,10 @@ def contour(
     corner = float(np.where(np.isfinite(given), given, TOLERANCE).max(initial=0.0))
     segment = prepared.segment[row]
     for_tip = path["tip"][segment] != JOINTS
-    error, line = np.zeros(len(line)), line.copy()
 
     def measure(some: np.ndarray, here: np.ndarray, there: np.ndarray, along: np.ndarray) -> None:
         reach = np.linalg.norm(here - there, axis=1) + corner + 1e-3
-        error[some], nearest = contour_error(here, along, segment[some], reach)
-        line[some] = path["line"][nearest]
+        error[some], _ = contour_error(here, along, segment[some], reach)
 
     some = (state != State.HOME) & ~for_tip
     measure(some, points[some, :3], wanted[some, :3], path)
@@ -140,7 +139,7 @@ def contour(
         length = path["tool_length"][segment[some]]
         here, there = (prepared.tip.tip.places(each[some], length)[0] for each in (points, wanted))
         measure(some, here, there, prepared.tip.path)
-    return error, line
+    return error
 
 
 def _times(result: Result, prepared: Prepared, state: np.ndarray) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from typing import Any
 
 from jupyter_core.paths import jupyter_config_path
 from jupyter_core.utils import run_sync
+from jupyter_server.base.handlers import APIHandler
 from tornado import web
 from tornado.httputil import HTTPServerRequest
 from tornado.routing import Matcher, Rule
@@ -35,7 +36,7 @@ _LARGEST = 256 << 20  # bytes of a page's message, such as a file that is import
 _ENDING = 10.0  # s that the kernels may take to end
 
 _HOSTS = ("127.0.0.1", "localhost", "[::1]", "::1")  # of any port: one may have been forwarded by ssh
-_NOT_THEIRS = (VoilaShutdownKernelHandler, RequestInfoSocketHandler)  # the latter tells a page's address to anybody
+_NOT_THEIRS = (RequestInfoSocketHandler,)  # tells a page's address to anybody
 _OPEN = """<!doctype html><meta charset="utf-8"><meta name="referrer" content="no-referrer"><title>RDS</title>
 <meta http-equiv="refresh" content="0;url={0}"><p><a href="{0}">To the page of RDS</a></p>
 """
@@ -112,7 +113,17 @@ class KernelSocket(VoilaKernelWebsocketHandler):
         return super().write_message(message, binary)
 
 
-_IN_PLACE = {VoilaKernelWebsocketHandler: KernelSocket}  # of Voilà's
+class KernelStays(APIHandler):
+    """A page that goes asks for the end of its kernel, which comes later (see `PanelsServer`): that is no fault."""
+
+    @web.authenticated
+    async def post(self, kernel_id: str) -> None:
+        """Answer that it was heard."""
+        self.set_status(204)
+        self.finish()
+
+
+_IN_PLACE = {VoilaKernelWebsocketHandler: KernelSocket, VoilaShutdownKernelHandler: KernelStays}  # of Voilà's
 
 
 class _ForeignHost(Matcher):

@@ -6,11 +6,10 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.core.errors import InputError
 from rds.panels.drawing.cells import Cells
 from rds.panels.drawing.state import CELLS, PICTURES, Drawing
 from rds.panels.kit.button import attempt, button
-from rds.panels.kit.field import FieldView
+from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.file_import import FileImport
 from rds.panels.kit.layout import row
@@ -57,9 +56,7 @@ class DrawingView:
 
     def make(self) -> None:
         """What the button does."""
-        refused = [view.field.label for view in self._views.values() if view.refused]
-        if refused:
-            raise InputError(f"first mend what is refused: {', '.join(refused)}")
+        check_mended(self._views.values())
         self.notice.clear()
         name = self.drawing.write()
         self.notice.say(f"written as {name}, and open in the program panel", "good")

@@ -278,7 +278,7 @@ def contour_errors(of: Mapping[str, np.ndarray], prepared: Prepared) -> np.ndarr
     """How far each measured position is from the path, mm; `of` are some rows of a run, as columns."""
     from rds.nc.run.judge import contour, located
 
-    return contour(of, located(of, prepared), of["program_state"].astype(int))[0]
+    return contour(of, located(of, prepared), of["program_state"].astype(int))
 
 
 def shown(columns: Sequence[str]) -> list[str]:

@@ -12,7 +12,7 @@ from rds.grading.review.entries import Kind
 from rds.panels.grading.review import USES
 from rds.panels.grading.state import GradingState, rows
 from rds.panels.kit.button import attempt, button, follow, runs, watch
-from rds.panels.kit.field import FieldView
+from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
@@ -63,9 +63,9 @@ class GradingView:
         again = button("Grade again", tip, self.regrade, say)
         kind, by = self._fields("kind", "by")
         self._words = {name: self._fields(name)[0] for name in dict.fromkeys(chain(*USES.values()))}
-        batch = self._fields("assignment", "submissions", "out", "jobs", "scheduler")
+        self._batch = self._fields("assignment", "submissions", "out", "jobs", "scheduler")
         side = [
-            group("Batch", *batch, row(check, self._run)),
+            group("Batch", *self._batch, row(check, self._run)),
             group("Review", kind, *self._words.values(), by, row(words)),
             group("Attempts, and a mended assignment", *self._fields("attempts", "new"), row(best, again)),
             group("Export", *self._fields("to", "gradebook"), row(export)),
@@ -87,6 +87,7 @@ class GradingView:
 
     def grade(self) -> None:
         """Begin or go on."""
+        check_mended(self._batch)
         self._said.value = ""
         follow(self.bar, self.notice, self.state.grade, self._graded)
 
@@ -112,6 +113,7 @@ class GradingView:
 
     def review(self) -> None:
         """Keep what a grader says, and show the class with it."""
+        check_mended(self._words.values())
         said = self.state.review()
         self.show()
         self.notice.say(said, "good")

@@ -13,7 +13,7 @@ from rds.panels.jog.hold import HoldButtons
 from rds.panels.jog.state import Jog
 from rds.panels.jog.turn import TurnButtons
 from rds.panels.kit.button import attempt, follow, halt, order
-from rds.panels.kit.field import FieldView
+from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
@@ -63,9 +63,11 @@ class JogView:
         tip = "Move the axis to the position; Stop ends that"
         self._go = order(shell, "Go", tip, self.go, say)
         goal = [FieldView(jog.choices, name) for name in (("goal_axis", "goal") if jog.axes else ())]
+        self._motion = {name: FieldView(jog.choices, name) for name in motion}
+        self._goal = [*goal, self._motion["speed"]]
         side = [
             group("The machine", row(self._take, self._free), row(self._rest, self._home)),
-            group("Motion", *(FieldView(jog.choices, name) for name in motion)),
+            group("Motion", *self._motion.values()),
             *([group("To a position", *goal, row(self._go))] if goal else []),
             self._homing,
         ]
@@ -101,6 +103,7 @@ class JogView:
 
     def go(self) -> None:
         """Move the axis that is chosen to the position."""
+        check_mended(self._goal)
         self.notice.clear()  # what was refused before is over
         self.jog.go(self.jog.choices["goal_axis"], self.jog.choices["goal"])
 
@@ -112,6 +115,8 @@ class JogView:
     def _hold(self, name: str) -> HoldButtons:
         def heard(kind: str, direction: int) -> None:
             try:
+                if kind in ("hold", "step"):
+                    check_mended([self._motion["speed"]])
                 if kind == "hold":
                     self.jog.hold(name, direction)
                 elif kind == "step":
@@ -129,6 +134,7 @@ class JogView:
         def heard(kind: str, direction: int) -> None:
             try:
                 if kind == "turn":
+                    check_mended([self._motion["spindle_speed"]])
                     self._in_time(name)
                     self.jog.turn(name, direction)
                 else:

@@ -17,6 +17,7 @@ from rds.panels.session.task import Task
 
 T = TypeVar("T")
 _ORDER = "rds-order"  # what static/presence.js lets go only in time
+_MAY_ORDER = "rds-may-order"  # what it gives up where something that stops is pressed after it
 WAIT = "wait until it is done, or stop it first"
 
 
@@ -47,6 +48,7 @@ def order(
 
     made = button(text, tip, in_time, notice, primary)
     made.add_class(_ORDER)
+    made.add_class(_MAY_ORDER)
     return made
 
 

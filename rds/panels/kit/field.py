@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from html import escape
 from typing import Any
 
@@ -157,6 +158,13 @@ def _text(value: Any) -> str:
 
 def _placeholder(field: Number) -> str:
     return field.when_empty if field.optional else field.range
+
+
+def check_mended(views: Iterable[FieldView]) -> None:
+    """InputError that names those in sight with a refused value: what holds is not what stands there."""
+    refused = [view.field.label for view in views if view.refused and view.layout.display != "none"]
+    if refused:
+        raise InputError(f"first mend what is refused: {', '.join(refused)}")
 
 
 def field_group(choices: Choices, names: list[str], title: str = "") -> widgets.VBox:

@@ -8,7 +8,7 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.panels.kit.button import button, follow
-from rds.panels.kit.field import FieldView
+from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
@@ -62,11 +62,12 @@ class BusView:
         self._end = button("Stop", "Stop listening", self.monitor.end, say)
         self._task: Any = None
         self._ticks = 0
-        fields = [FieldView(self.choices, name) for name in ("bitrate", "period", "answer")]
+        self._fields = [FieldView(self.choices, name) for name in ("bitrate", "period", "answer")]
+        self._filter = FieldView(self.choices, "filter")
         tip = "Load and worst-case response times of this machine in this dialect"
         side = [
-            group("Monitor", FieldView(self.choices, "filter"), row(self._listen, self._pause, self._end)),
-            group("Load at worst", *fields, row(button("Analyse", tip, self.analyse, say))),
+            group("Monitor", self._filter, row(self._listen, self._pause, self._end)),
+            group("Load at worst", *self._fields, row(button("Analyse", tip, self.analyse, say))),
         ]
         self.widget = columns(side, [self.bar, self.notice, self.live, self.load])
         self._enable()
@@ -76,6 +77,7 @@ class BusView:
         """Begin."""
         if self._task is not None:
             return
+        check_mended([self._filter])
         interface, channel = self.state.bus
         work = self.monitor.watch(interface, channel, **self.session.bus_options)
         self._task = self.session.work("bus monitor", work, self.monitor.end)
@@ -89,6 +91,7 @@ class BusView:
 
     def analyse(self) -> None:
         """The bus at worst."""
+        check_mended(self._fields)
         machine, dialect = self.state.machine, self.state.choices["dialect"]
         bitrate, period, answer = (self.choices[name] for name in ("bitrate", "period", "answer"))
 

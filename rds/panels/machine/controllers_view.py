@@ -9,7 +9,7 @@ import ipywidgets as widgets
 from rds.bus.modules.oacs.tuning import ADVICE, quality
 from rds.core.errors import InputError
 from rds.panels.kit.button import button, follow, order
-from rds.panels.kit.field import FieldView
+from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
@@ -33,8 +33,11 @@ class ControllersView:
         self._which = widgets.Dropdown(description="Module", tooltip="The module that is tuned")
         self._which.observe(self._chosen, "value")
         say = self.notice
-        gains = [FieldView(state.tuning, name) for name in ("controller", "Kp", "Ki", "Kd")]
-        rest = widgets.Box([FieldView(state.tuning, name) for name in state.tuning.fields if name not in _GAINS])
+        gains = [FieldView(state.tuning, name) for name in _GAINS]
+        others = [FieldView(state.tuning, name) for name in state.tuning.fields if name not in _GAINS]
+        self._tuning = [*gains, *others]
+        self._steps = [FieldView(state.choices, name) for name in ("step", "period", "settled")]
+        rest = widgets.Box(others)
         rest.add_class("rds-fields")
         more = widgets.Accordion([rest], titles=("Limits and times",))
         more.add_class("rds-folded")
@@ -49,7 +52,7 @@ class ControllersView:
                     button("Read", "Take what the module told at the last scan", self.read, say),
                 ),
             ),
-            group("Step response", *(FieldView(state.choices, name) for name in ("step", "period", "settled"))),
+            group("Step response", *self._steps),
             group(
                 "Keep",
                 FieldView(files, "file"),
@@ -84,6 +87,7 @@ class ControllersView:
 
     def tune(self) -> None:
         """Set the tuning."""
+        check_mended(self._tuning)
         follow(
             self.bar,
             self.notice,
@@ -97,6 +101,7 @@ class ControllersView:
 
     def step(self) -> None:
         """Record a response."""
+        check_mended(self._steps)
         follow(self.bar, self.notice, lambda: self.state.step(self._number()), self._responded)
 
     def suggest(self) -> None:
@@ -106,6 +111,7 @@ class ControllersView:
 
     def save(self) -> None:
         """To a file."""
+        check_mended(self._tuning)
         self.notice.say(f"wrote {self.state.save_tuning(self._number(), self._files['file']).name}", "good")
 
     def load(self) -> None:

@@ -6,9 +6,8 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.core.errors import InputError
 from rds.panels.kit.button import button
-from rds.panels.kit.field import FieldView
+from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.layout import columns, row
 from rds.panels.kit.notice import Notice
@@ -49,9 +48,7 @@ class ObjectsView:
     def make(self) -> None:
         """What the button does."""
         shown = [*self.objects.names(), *OF_ALL, "program"]
-        refused = [view.field.label for name in shown if (view := self._views[name]).refused]
-        if refused:
-            raise InputError(f"first mend what is refused: {', '.join(refused)}")
+        check_mended(self._views[name] for name in shown)
         self.notice.clear()
         name, replaced = self.objects.write()
         place = ", in place of the one made before," if replaced else ""

@@ -18,6 +18,7 @@ from rds.nc.validate import TOLERANCE
 _STATIC = Path(__file__).parent / "static"
 _MOST = 40_000  # points that are sent; more are left out evenly, which no screen shows
 _CROSSES = 60
+_SIDES = ("XY", "ZX", "YZ")  # what is seen first: the first whose axes the machine has
 
 
 @cache
@@ -40,7 +41,8 @@ class PathView(anywidget.AnyWidget):
     height = traitlets.Int(330).tag(sync=True)  # px
 
     def __init__(self, machine: Machine, **options: Any):
-        super().__init__(_esm=_static("js"), _css=_static("css"), **options)
+        seen = next((side for side in _SIDES if set(side) <= set(machine.axes)), _SIDES[0])  # a lathe has no Y
+        super().__init__(_esm=_static("js"), _css=_static("css"), **{"side": seen, **options})
         self._box = travel_of(machine)
         self.travel = self._box.tolist()
         self._points = [np.zeros((0, 3))] * 3

@@ -9,7 +9,7 @@ import ipywidgets as widgets
 from rds.core.errors import InputError
 from rds.nc.language.frame import SYSTEMS
 from rds.panels.kit.button import button
-from rds.panels.kit.field import FieldView
+from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
@@ -46,7 +46,8 @@ class SetupView:
                 Number(f"reads {axis}", f"{axis} should read", tip, None, "mm", optional=True, when_empty="stays")
             )
         self._axes, self._choices = axes, Choices(fields)
-        rows = [row(FieldView(self._choices, f"at {axis}"), FieldView(self._choices, f"reads {axis}")) for axis in axes]
+        self._views = [FieldView(self._choices, f"{which} {axis}") for axis in axes for which in ("at", "reads")]
+        rows = [row(*pair) for pair in zip(self._views[::2], self._views[1::2], strict=True)]
         tip = "Write the origin into the parameter file; the program is checked anew with it"
         press = button("Touch off", tip, self._touch_off, self.notice)
         again = button("Take positions", "Fill in where the axes were measured last", self._take, self.notice)
@@ -79,6 +80,7 @@ class SetupView:
             self._choices.set(f"at {axis}", round(at[axis], 4) if axis in at else None)
 
     def _touch_off(self) -> None:
+        check_mended(self._views)
         chosen = self._choices
         reads = {axis: chosen[f"reads {axis}"] for axis in self._axes if chosen[f"reads {axis}"] is not None}
         if not reads:

@@ -182,8 +182,10 @@ class Program:
     def edit(self, text: str) -> None:
         """What was typed; looked at again by `tick()`."""
         if text != self.text.text:
-            self.text.edit(text)
-            self.look_again()
+            try:
+                self.text.edit(text)
+            finally:  # it is in the editor, also where no draft of it can be written
+                self.look_again()
 
     def save(self) -> None:
         """Write the file; InputError where it was changed by somebody else, or cannot be written."""
@@ -244,11 +246,13 @@ class Program:
             self.latest = found or self.latest
             return found
         self._early = None
-        if task.error is not None:
-            self.session.say(f"the check failed: {task.error}", "error")
-            return None
-        self.latest = task.result
-        return task.result
+        if task.error is not None:  # what was found before is of another text
+            from rds.panels.program.check import Look, Mark
+
+            self.latest = Look((Mark(0, 0, 0, f"the check failed: {task.error}"),))
+        else:
+            self.latest = task.result
+        return self.latest
 
     def _begin(self) -> Task[Look]:
         text, setup, machine = self.text, self.setup(), self.machine

@@ -59,6 +59,7 @@ class ProgramText:
         self._saved = saved
         begin = bundled()[self.name].text() if self.name in bundled() else self._begin
         self.text = draft if draft is not None else saved if saved is not None else begin
+        self._drafted = draft  # what the draft holds
 
     @property
     def is_new(self) -> bool:
@@ -71,12 +72,20 @@ class ProgramText:
         return self.text != self._saved
 
     def on_disk(self) -> Path:
-        """A file that holds the text as it is now: the program itself, or its draft, written if there is none yet."""
+        """A file that holds the text as it is now: the program itself, or its draft, written where it holds another.
+
+        InputError where it cannot be written.
+        """
         if not self.changed:
             return self.path
-        if not self.draft.exists():
-            write_whole(self.draft, _data(self.text))
+        if self._drafted != self.text or not self.draft.exists():
+            self._keep()
         return self.draft
+
+    def _keep(self) -> None:
+        text = self.text
+        write_whole(self.draft, _data(text))
+        self._drafted = text
 
     @property
     def replaced(self) -> bool:
@@ -101,7 +110,7 @@ class ProgramText:
         if text == self._saved:
             self.draft.unlink(missing_ok=True)
         else:
-            write_whole(self.draft, data)
+            self._keep()
 
     def save(self) -> None:
         """Write the file; InputError where it has changed on disk since it was opened, or cannot be written."""

@@ -15,7 +15,7 @@ from rds.panels.equipment.result_view import timing_line
 from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.interpolator.motion import MADE, OWN
 from rds.panels.kit.button import WAIT, attempt, is_free, say_error
-from rds.panels.kit.field import FieldView, field_group
+from rds.panels.kit.field import FieldView, check_mended, field_group
 from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
@@ -195,6 +195,7 @@ class ProgramView:
         if not is_free(self.operator.bar, self.notice):
             return
         self.notice.clear()
+        check_mended(self._motion.values())
         try:
             work = self.program.run(begin)
         finally:

@@ -79,7 +79,7 @@ class Number(Field):
     def _number(self, value: Any) -> Any:
         if not isinstance(value, str):
             return value
-        text = value.strip().removesuffix(self.unit).strip()
+        text = value.replace("−", "-").strip().removesuffix(self.unit).strip()  # the minus sign that pictures have
         if text.count(",") == 1 and "." not in text:
             text = text.replace(",", ".")
         try:

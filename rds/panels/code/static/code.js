@@ -51,7 +51,7 @@ function render({ model, el }) {
   let timer = 0, view = null;
 
   const options = (after) => model.get("words").filter((word) => word.after === after).map((word) => (
-    { label: word.label, detail: word.detail, info: word.info, boost: 10, type: word.detail === "function" ? "function" : "variable" }));
+    { label: word.label, detail: word.detail, info: window.rdsText ? window.rdsText(word.info) : word.info, boost: 10, type: word.detail === "function" ? "function" : "variable" }));
   function complete(context) {
     const key = context.matchBefore(/params\[\s*["']\w*/);
     if (key) {

@@ -5,9 +5,11 @@
 const STEP_MS = 80; // a little more often than rows come
 const WHOLE_MS = 400; // between two drawings of a whole run
 const MOST = 3000; // points of a trace that are drawn: more are thinned to their extremes
-const LOWEST = 92; // px of a lane
-const LETTER = 6.2; // px, of an axis's label
+const LOWEST = 116; // px of a lane
+const LETTER = 7.7; // px, of an axis's label
 const AXIS = 34; // px below the last lane
+// numbers at an axis as all others of the page are: in some browsers' own way 1500 is 1.500
+const plain = (u, shown) => shown.map((value) => (value == null ? null : String(Number(value.toPrecision(9)))));
 
 function render({ model, el }) {
   const style = document.createElement("style");
@@ -106,8 +108,8 @@ function render({ model, el }) {
     lanes.forEach((lane, i) => {
       const of = traces.flatMap((trace, k) => (trace.scale === lane ? [k] : []));
       const isLast = i === lanes.length - 1, height = Math.max(room * weights[i] / sum, LOWEST);
-      const axes = [{ stroke: text, grid, label: isLast ? say("time [s]") : undefined, labelSize: isLast ? 18 : 0, size: isLast ? AXIS - 2 : 4, values: isLast ? undefined : (u, shown) => shown.map(() => "") },
-        { scale: "y", stroke: text, grid, size: 58, labelSize: 18, label: axisLabel(of.map((k) => traces[k]), height), space: 22 }];
+      const axes = [{ stroke: text, grid, label: isLast ? say("time [s]") : undefined, labelSize: isLast ? 18 : 0, size: isLast ? AXIS - 2 : 4, values: isLast ? plain : (u, shown) => shown.map(() => "") },
+        { scale: "y", stroke: text, grid, size: 58, labelSize: 18, label: axisLabel(of.map((k) => traces[k]), height), space: 18, values: plain }];
       const series = [{ label: "time [s]", value: (u, v) => (v == null ? "–" : v.toFixed(3)) }];
       of.forEach((k) => series.push({
         label: `${traces[k].name} [${traces[k].unit}]`, stroke: traces[k].color, width: traces[k].width || 1.6, dash: traces[k].dash || [],

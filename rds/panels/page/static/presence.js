@@ -8,6 +8,7 @@
 const FIELDS = ".widget-toggle-button, .widget-toggle-buttons button, .widget-upload"; // buttons that are fields
 const AT_ONCE = ".rds-stop, .rds-halt, .rds-work button, .rds-rescue button"; // what stops something waits for nothing
 const ORDER = ".rds-order"; // what moves the machine
+const MAY_ORDER = ".rds-order, .rds-may-order"; // or does so after a change of which only the kernel has heard
 
 // the later of two clocks: one may be set back, the other one stands still while the computer sleeps
 const clocks = () => [performance.now(), Date.now()];
@@ -34,7 +35,7 @@ function render({ model, el }) {
     const button = pressed(event);
     if (!button || button === through) return;
     if (button.matches(AT_ONCE)) {
-      const orders = [...waiting.values()].map((each) => each.button).filter((each) => each.matches(ORDER));
+      const orders = [...waiting.values()].map((each) => each.button).filter((each) => each.matches(MAY_ORDER));
       forget((each) => orders.includes(each)); // nothing that was pressed before may move the machine after it
       for (const each of orders) each.dispatchEvent(new Event("rds-given-up"));
       return;

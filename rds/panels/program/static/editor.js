@@ -101,10 +101,12 @@ function wordAt(text, at) {
   return null;
 }
 
+const say = (text) => (window.rdsText ? window.rdsText(text) : text);
+
 function completions(words) {
-  const of = (kind) => words.filter((word) => word.kind === kind).map(({ label, info }, n) => ({ label, detail: info, boost: -n / 10 }));
-  const [codes, keywords, functions] = ["code", "o", "function"].map(of);
+  const of = (kind) => words.filter((word) => word.kind === kind).map(({ label, info }, n) => ({ label, detail: say(info), boost: -n / 10 }));
   return (context) => {
+    const [codes, keywords, functions] = ["code", "o", "function"].map(of);
     const line = context.state.doc.lineAt(context.pos), before = line.text.slice(0, context.pos - line.from);
     if (/;|\([^)]*$/.test(before)) return null; // in a comment
     const word = /(?:^|[^a-z#<])([gm][\d.]*)$/i.exec(before), after = /^\s*o\s*(?:<[^>]*>|\d+)\s*([a-z]*)$/i.exec(before);
@@ -136,7 +138,7 @@ function render({ model, el }) {
       dom.className = "rds-editor-meaning";
       const name = document.createElement("b");
       name.textContent = word.said;
-      dom.append(name, ` ${info}`);
+      dom.append(name, ` ${say(info)}`);
       return { dom };
     };
     return { pos: line.from + word.from, end: line.from + word.to, above: true, create };
