@@ -98,6 +98,13 @@ def test_it_is_used_only_for_what_it_was_made_of(part: Path, tmp_path: Path, wha
     assert compiled_if_current(part, machine, how) is None
 
 
+def test_what_changes_while_it_is_read_is_not_compiled(part: Path) -> None:
+    drill = part.with_name("drill.ngc")
+    with pytest.raises(InputError, match=r"part\.ngc: changed while it was read"):
+        check_program(part, MACHINE, setup(part), lambda *_: drill.write_text(f"{DRILL}(deeper)\n") and None)
+    assert not part.with_suffix(".dat").exists()
+
+
 def test_a_file_of_someone_else_is_neither_overwritten_nor_removed(part: Path) -> None:
     data = part.with_suffix(".dat")
     data.write_text("1 2 3\n", encoding="utf-8")
