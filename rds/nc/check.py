@@ -95,8 +95,8 @@ def check_program(
     """Whether a machine can run a program: all faults, and the compiled form that a valid one leaves at `place`.
 
     The default is beside the program. A program with faults leaves none, and one of before is removed. Raises
-    InputError for files that cannot be read or written, and where the place of the compiled form is taken by a file
-    that is none.
+    InputError for files that cannot be read or written, or change while they are read, and where the place of the
+    compiled form is taken by a file that is none.
     """
     setup = setup.on(machine, program)
     header = describe(program, machine, setup)
@@ -109,8 +109,14 @@ def check_program(
     if program.stat().st_size <= _LARGEST_READ_TWICE:
         for fault in faults_never_run(program, setup.options):
             validator.warn(in_dead_code(fault))
+
+    def at_the_end() -> dict[str, Any]:
+        if describe(program, machine, setup) != header:
+            raise InputError("changed while it was read; check it again when it is saved", str(program))
+        return _summary(validator)
+
     try:
-        write_files({place: write_compiled(header, _while_valid(blocks, validator), lambda: _summary(validator))})
+        write_files({place: write_compiled(header, _while_valid(blocks, validator), at_the_end)})
     except _Faulty:
         for _ in blocks:  # the rest is looked at all the same
             pass

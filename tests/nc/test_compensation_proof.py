@@ -108,6 +108,13 @@ def test_a_neck_narrower_than_the_cutter_is_gouged_by_the_difference() -> None:
     assert fits.gouges() == []
 
 
+def test_the_last_digit_of_a_program_is_no_gouge() -> None:
+    ops = (*straight((0, 10), (0, 50)), arc((7.071, 67.071), (24.142, 50), -1), *straight((40.0, 70.333)))
+    found = proved(Case("XY", LEFT, 3.0, (-20.0, 10.0, 0.0), ops))
+    assert -1e-4 < found.parts[1].least < -1e-5 and found.gouges() == []
+    assert [part.role for part in found.gouges(1e-5)] == ["contour", "contour"]
+
+
 def test_an_entry_across_the_contour_is_found_and_told_apart() -> None:
     """From inside the square outwards: the edge is beyond the contour by the cutter's radius and the way in."""
     square = straight((0, 0), (0, 30), (30, 30), (30, 0), (0, 0))

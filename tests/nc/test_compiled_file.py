@@ -144,6 +144,13 @@ def test_a_program_in_a_folder_for_reading_alone_is_compiled_for_as_long_as_it_i
     assert not place.exists()
 
 
+def test_what_changes_while_it_is_read_is_not_compiled(part: Path) -> None:
+    drill = part.with_name("drill.ngc")
+    with pytest.raises(InputError, match=r"part\.ngc: changed while it was read"):
+        check_program(part, MACHINE, setup(part), lambda *_: drill.write_text(f"{DRILL}(deeper)\n") and None)
+    assert not part.with_suffix(".dat").exists()
+
+
 def test_a_file_of_someone_else_is_neither_overwritten_nor_removed(part: Path) -> None:
     data = part.with_suffix(".dat")
     data.write_text("1 2 3\n", encoding="utf-8")

@@ -206,3 +206,9 @@ def test_entities_are_refused_in_every_coding(tmp_path: Path, coding: str) -> No
     (tmp_path / "a.svg").write_text(text, encoding=coding)
     with pytest.raises(InputError, match="defines entities"):
         read_svg(tmp_path / "a.svg")
+
+
+def test_flowed_text_of_inkscape_is_told(drawn: Read) -> None:
+    flowed = f"<flowRoot><flowRegion>{BOX}</flowRegion><flowPara>Part 7</flowPara></flowRoot>"
+    drawing = drawn(BOX + flowed)
+    assert len(drawing.curves) == len(drawing.notes) == 1 and "1 × text (Path > Object" in drawing.notes[0]

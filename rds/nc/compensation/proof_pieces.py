@@ -17,7 +17,7 @@ ENTRY, LEAD_IN, CONTOUR, LEAD_OUT, EXIT, RAPID = "entry", "lead-in", "contour", 
 CONTACT = 0.002  # mm; a contour whose ends come so near to each other is closed (programs are written to 0.001 mm)
 
 MM = {"MM": 1.0, "INCHES": 25.4}  # mm of a program unit
-TOLERANCE = 1e-6  # mm; less is rounding
+TOLERANCE = 0.001  # mm; what is no gouge yet: programs are written to it
 
 
 class Piece(NamedTuple):

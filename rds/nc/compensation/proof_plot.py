@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rds.nc.compensation.moves import XY
-from rds.nc.compensation.proof_pieces import CONTOUR, ENTRY, EXIT, LEAD_IN, LEAD_OUT, MM, RAPID, TOLERANCE
+from rds.nc.compensation.proof_pieces import CONTOUR, ENTRY, EXIT, LEAD_IN, LEAD_OUT, MM, RAPID
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +70,7 @@ def _title(proof: Proof, stretch: StretchProof) -> str:
 
 
 def _length(mm: float) -> str:
-    if abs(mm) < TOLERANCE:
+    if abs(mm) < 1e-6:
         return "0 (to 1 nm)"
     factor, unit = _scale(mm)
     return f"{mm * factor:.3g} {unit}"

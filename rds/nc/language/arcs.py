@@ -44,9 +44,9 @@ def centre_offsets(words: dict[str, float], state: State, key: str) -> tuple[flo
     if not by_centre:
         raise Fault(f"an arc needs its centre ({names} in {plane}) or its radius R; add them", key)
     if third in words:
+        use = "leave it out" if first in words or second in words else f"use {names}"
         raise Fault(
-            f"{third.upper()} is no centre of an arc in the plane of {plane}; use {names}, or another plane before",
-            third,
+            f"{third.upper()} is no centre of an arc in the plane of {plane}; {use}, or another plane before", third
         )
     if state.arc_absolute:
         for letter in (first, second):

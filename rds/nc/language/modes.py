@@ -224,8 +224,9 @@ def select_tool(m: Context, number: int) -> None:
     try:
         m.tools.selected = m.tools.find(number)
     except Fault as fault:
-        fault.key = "t"
-        raise
+        tool, offset = divmod(number, 100)
+        turret = f"; as of a lathe's turret (tool {tool}, offset {offset}), write T{tool} M6 and then G43"
+        raise Fault(f"{fault}{turret if tool and offset else ''}", "t") from None
     m.out.call("SELECT_TOOL", number)
 
 

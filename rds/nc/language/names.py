@@ -59,7 +59,7 @@ def known_names(m: Context, control: Control, line: Callable[[], int]) -> dict[s
         "_current_tool": lambda: float(tools.spindle.number),
         "_selected_tool": lambda: float(tools.slots[tools.selected].number if tools.selected > 0 else 0),
         "_current_pocket": lambda: float(tools.spindle.pocket),
-        "_selected_pocket": lambda: float(tools.slots[tools.selected].pocket if tools.selected > 0 else 0),
+        "_selected_pocket": lambda: float(tools.slots[tools.selected].pocket if tools.selected > 0 else tools.selected),
         "_value": lambda: control.value,
         "_value_returned": lambda: float(control.returned),
         "_call_level": lambda: float(control.depth),

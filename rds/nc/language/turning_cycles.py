@@ -65,9 +65,11 @@ def turning_cycle(m: Context, block: Block, end: list[float]) -> None:
 def _check(m: Context, block: Block, name: str, key: str) -> None:
     state, words = m.state, block.words
     if "q" not in words:
+        units = {"G70": "; where it says that lengths are in inches (Mach3), write G20"}
+        units["G71"] = "; where it says that lengths are in mm (Mach3, Siemens), write G21"
         raise Fault(
             f"{name} without Q; write the number of the subroutine that holds the contour: O100 SUB, its moves, O100"
-            f" ENDSUB, and {name} Q100",
+            f" ENDSUB, and {name} Q100{units.get(name, '')}",
             key,
         )
     if state.plane != XZ:

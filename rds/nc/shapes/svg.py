@@ -25,7 +25,7 @@ _LENGTH = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?
 _TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _PASSED_OVER = {
-    "text": "text (Path > Object to Path in Inkscape makes curves of it)",
+    **dict.fromkeys(("text", "flowRoot"), "text (Path > Object to Path in Inkscape makes curves of it)"),
     "image": "a pixel image (`rds nc make outline` traces one)",
     "foreignObject": "foreign content",
 }
