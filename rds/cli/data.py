@@ -99,11 +99,11 @@ def _show_friction(found: FrictionCurve) -> None:
     heads = ["log", "begin s", "length s", f"speed {found.speed_unit}", f"friction {found.force_unit}", "std error"]
     show_table("Stretches of constant speed", heads, rows)
     numbers = [
-        [way, name, cell(told.value), cell(told.std_error), told.unit]
+        [way, name, cell(told.value), cell(told.std_error), f"{cell(told.low)} to {cell(told.high)}", told.unit]
         for way, of_way in found.directions.items()
         for name, told in of_way.items()
     ]
-    show_table("Friction", ["direction", "", "value", "std error", "unit"], numbers)
+    show_table("Friction", ["direction", "", "value", "std error", "95 % interval", "unit"], numbers)
     for sentence in found.unidentifiable:
         typer.echo(f"- not told: {sentence}")
 

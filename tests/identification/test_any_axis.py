@@ -234,6 +234,20 @@ def test_the_errors_of_a_friction_curve_count_that_all_four_numbers_are_estimate
     assert beyond <= 6
 
 
+def test_the_intervals_of_a_friction_curve_hold_where_points_are_few() -> None:
+    """A line through two points leaves nothing: the standard errors of both its numbers were 0."""
+    draw = np.random.default_rng(3)
+    for v, within in (([10.0, 40.0], True), ([10.0, 20.0, 40.0], True), ([10.0, 20.0, 40.0], False)):
+        speeds, held = np.array(v), 0
+        for _ in range(100):
+            f = 8.0 + 0.2 * speeds + 0.1 * draw.standard_normal(len(v))
+            points = [SteadyPoint("a", 0.0, 1.0, *map(float, at), 0.1 * within) for at in zip(v, f, strict=True)]
+            numbers, _ = _fitted(points, 1.0, "mm/s", "N", "mm/s")
+            held += numbers["F_c"].low < 8.0 < numbers["F_c"].high
+            assert numbers["F_v"].std_error > 0.0
+        assert held >= 90
+
+
 def test_what_a_friction_curve_cannot_tell() -> None:
     fast = friction_curve([steady([20.0, 25.0, 30.0, 36.0, 44.0, 53.0, 65.0], noise=0.05)])
     assert set(fast.directions["forward"]) == {"F_c", "F_v"}

@@ -10,6 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis.strategies import floats, integers
 
 from rds.core.errors import InputError
+from rds.identification.fit.fit import fit
 from rds.identification.logs.log import Log
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import structure
@@ -109,7 +110,7 @@ def test_a_spindle_s_steady_speed_is_no_fault_beside_steps() -> None:
     start = structure("spindle").start
     assert start is not None
     assert next(iter(start([steady, steps])))[0] == pytest.approx(values, rel=1e-3)
-    with pytest.raises(InputError, match="the command never changes"):
+    with pytest.raises(InputError, match="the speed never changes"):
         start([steady, steady])
 
 
@@ -125,3 +126,17 @@ def test_a_mass_that_moves_by_itself_is_no_library_axis() -> None:
         structure("axis-mass").as_model(  # type: ignore[misc]
             {"M": 2.0, "F_v": 1.0, "F_c": 4.0, "offset": 5.0, "force_gain": 10.0}
         )
+
+
+def test_logs_that_begin_with_their_step_tell_a_spindle() -> None:
+    """The speed changes under a command that is the same throughout; such logs were refused as if nothing changed."""
+    t = np.arange(800) * 1e-3
+    units = {"position": "rev/min", "command": "V"}
+    logs = [
+        Log(f"{level:g} V", t, np.full(len(t), level), np.round(960.0 * level * -np.expm1(-t / 0.08)), units=units)
+        for level in (2.0, 4.0)
+    ]
+    found = fit(logs, structure("spindle"))
+    assert found.values() == pytest.approx({"tau": 0.08, "K": 960.0}, rel=1e-3) and not found.unusable()
+    with pytest.raises(InputError, match="the command is 0 throughout"):
+        fit(Log("coast", t, 0.0 * t, 2000.0 * np.exp(-t / 0.08), units=units), structure("spindle"))

@@ -85,6 +85,7 @@ def test_what_to_do_about_a_cell(cell: str, words: str) -> None:
         ("0 days 00:00:01.5", "spans as s"),
         ("1.002,5", "export the file without a sign that parts the thousands"),
         ("1 002,5", "export the file without a sign that parts the thousands"),
+        ("0.1995", "with the same decimal sign in every cell"),
         ("1'002.5", "export the file without a sign that parts the thousands"),
     ],
 )

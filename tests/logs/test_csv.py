@@ -158,6 +158,8 @@ def test_words_are_kept_apart_and_named_where_a_number_should_be(tmp_path: Path)
         ("a,b\n1,2\n3\n5,6\n", r"line 3: it has 1 cells"),
         ("a,b\n1,2\n3,4\n5,6,7\n8,9\n", r"line 4: it has 3 cells"),
         ("a,b\0\n1,2\n", "null bytes"),
+        ('"1,2,3"\n"3,4,5"\n', "each line as a whole stands in quotation marks"),
+        (" a  b\n\n[  0  0.5;\n   1  0.5;\n   2  0.5]\n", "as a matrix is typed in MATLAB"),
     ],
 )
 def test_what_is_no_table_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
@@ -165,6 +167,15 @@ def test_what_is_no_table_is_refused(tmp_path: Path, text: str, sentence: str) -
     path.write_text(text)
     with pytest.raises(InputError, match=sentence):
         read_csv(path)
+
+
+@pytest.mark.parametrize("cell", ["RUN", "\u22122", "\u0660.\u0661", "1_0"])
+def test_a_cell_that_is_no_number_makes_words_of_its_column_alone(tmp_path: Path, cell: str) -> None:
+    """Arrow names the row as well in its error since some version, and the whole file was refused."""
+    path = tmp_path / "log.csv"
+    path.write_text("t,u\n" + "".join(f"{k},{cell if k == 100 else 1}\n" for k in range(200)), encoding="utf-8")
+    table = read_csv(path)
+    assert table.columns["u"].text == (100, cell) and len(table.columns["t"].values) == 200
 
 
 def test_utf_16_as_spreadsheets_save_it_is_read(tmp_path: Path) -> None:

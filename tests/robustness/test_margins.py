@@ -47,6 +47,15 @@ def test_a_loop_that_is_slower_than_the_lowest_frequency_has_the_phase_margin_of
     assert loop_margins(proportional(1e-3), [axis(0.01, 1.0)], T)[0, 1] == pytest.approx(90.0, abs=0.1)
 
 
+def test_a_loop_that_ends_on_the_negative_axis_has_a_gain_margin() -> None:
+    """An axis faster than its sampling is unstable at Nyquist's frequency first; its margin was said to be infinite."""
+    models = [axis(tau, 1.0) for tau in (0.1 * T, 0.3 * T)]
+    for k, margin in enumerate(loop_margins(proportional(200.0), models, T)[:, 0]):
+        edge = 200.0 * 10 ** (margin / 20)
+        below, above = (loop_margins(proportional(edge * by), models[k : k + 1], T)[0, 3] for by in (0.99, 1.01))
+        assert below < 1.0 < above
+
+
 def test_the_least_distance_may_lie_between_two_frequencies() -> None:
     model = axis(0.01, 1.0)
     edge = 10 ** (loop_margins(proportional(1.0), [model], T)[0, 0] / 20)

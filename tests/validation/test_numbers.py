@@ -13,6 +13,7 @@ from rds.core.errors import InputError
 from rds.identification.fit.initial_state import estimate_start
 from rds.identification.fit.needed_voltage import needed_voltage, static_curve
 from rds.identification.fit.residuals import BAND, LONGEST, bandwidth, block_length, effective_samples, residual_tests
+from rds.identification.fit.smoothing import speed_range
 from rds.identification.logs.fingerprint import fingerprint, shared
 from rds.identification.logs.log import Log
 from rds.identification.logs.motion import noise as noise_of
@@ -72,6 +73,14 @@ def test_noise_is_told_beside_the_steps_of_an_encoder() -> None:
     for size in (0.3, 0.43, 0.6, 0.8):  # steps
         y = np.rint(motion + size * draw.standard_normal(5000))
         assert noise_of(y) == pytest.approx(np.hypot(size, np.sqrt(1.0 / 12.0)), rel=0.12)
+
+
+def test_the_range_of_speeds_is_that_of_the_motion_and_not_of_its_noise() -> None:
+    """An axis of 10 mm/s behind 0.2 mm of noise was called valid up to the 75 mm/s tried here."""
+    t = np.arange(6000) * T
+    y = 10.0 / (4.0 * pi) * np.sin(4.0 * pi * t) + 0.2 * np.random.default_rng(1).standard_normal(len(t))
+    low, high = speed_range(Log("noisy", t, np.cos(4.0 * pi * t), y))
+    assert -12.0 < low < -8.0 and 8.0 < high < 12.0
 
 
 def test_the_velocity_changes_where_it_swings_whatever_the_encoder() -> None:

@@ -45,7 +45,7 @@ def test_the_true_model_is_valid_on_data_of_another_signal() -> None:
     assert a.free_run is not None and a.free_run.fit_percent > 99.9
     assert a.free_run.rmse < 0.5e-3  # mm: half a step of the encoder
     assert a.voltage is not None and a.voltage.relative_percent is not None and a.voltage.relative_percent < 3.0
-    assert found.verdict.sentence == "model is valid for fresh (up to 7.17 mm/s, 4.2 V and 11 Hz)."
+    assert found.verdict.sentence == "model is valid for fresh (up to 7.08 mm/s, 4.2 V and 11 Hz)."
     first, *reasons = str(found).splitlines()
     assert first == found.verdict.sentence and len(reasons) == len(found.verdict.reasons)
     sides = [line.split(":")[0] for line in reasons]
@@ -186,8 +186,9 @@ def test_an_error_that_grows_on_new_data_is_overfitting() -> None:
     (reason,) = [r for r in found.verdict.reasons if r.kind == "overfitted"]
     ahead = found.assessments["log"].ahead[100]
     speed = found.assessments["log"].ranges["velocity"]
-    assert speed.fitted is not None and speed.fitted[1] >= speed.here[1]
-    assert f"100 samples ahead, the RMSE is {ahead.rmse / 0.002:.1f} times" in reason.what
+    assert speed.fitted is not None
+    own = 0.002 * max(1.0, speed.here[0] / speed.fitted[0])  # mm: of a motion that is so much faster
+    assert f"100 samples ahead, the RMSE is {ahead.rmse / own:.1f} times" in reason.what
     assert found.verdict.word is not Word.VALID
 
 

@@ -15,6 +15,7 @@ does not show in the coherence. A command with an offset that keeps the axis mov
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,14 @@ from rds.core.extras import needed_for
 from rds.core.options import check_known
 from rds.core.quantities import Quantity
 from rds.identification.fit.estimate import UNUSABLE, Estimate
-from rds.identification.fit.frequency_response import FrequencyResponse, frequency_response, model_response, output_rate
+from rds.identification.fit.frequency_response import (
+    FrequencyResponse,
+    frequency_response,
+    model_rate,
+    model_response,
+    output_rate,
+    window_distortion,
+)
 from rds.identification.fit.made_estimate import made_estimate
 from rds.identification.fit.regression import regress
 from rds.identification.fit.smoothing import motion_of
@@ -35,6 +43,7 @@ from rds.identification.structures.structure import Structure
 STRUCTURES: Mapping[str, tuple[str, ...]] = {"spindle": ("delay",), "axis": ("delay",)}  # and their options
 OPTIONS = {"period": Quantity("period of a command that repeats; found in the data if not given", "s", above=0.0)}
 _LEAST_LINES = 3
+_PASSES = 2  # in which what windows do is worked out again, by the values before
 _FLOOR = 1e-3  # of the response: how exactly a line may be believed, however quiet
 _COHERENT = 0.9  # a median coherence below it deserves a warning
 _ENOUGH = 20_000  # samples to tell friction from
@@ -70,6 +79,12 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     names = [name for name in structure.parameters if name in ("tau", "K", "delay")]
     point, covariance, chi = _fit(responses, names, is_rate)
     values = dict(zip(names, point.tolist(), strict=True))
+    for _ in range(_PASSES if any(response.period is None for response in responses) else 0):
+        seen = [window_distortion(log, r, values, is_rate) for log, r in zip(logs, responses, strict=True)]
+        point, covariance, chi = _fit(
+            [replace(r, response=r.response / by) for r, by in zip(responses, seen, strict=True)], names, is_rate
+        )
+        values = dict(zip(names, point.tolist(), strict=True))
     order = list(structure.parameters)
     full = np.zeros((len(order), len(order)))
     places = [order.index(name) for name in names]
@@ -139,7 +154,7 @@ def _friction(logs: Sequence[Log], values: dict[str, float], covariance: np.ndar
     unidentifiable = []
     for name, way in (("friction_plus", 1.0), ("friction_minus", -1.0)):
         at, gain = order.index(name), order.index("K")
-        one_way = [_steady(log, values["tau"]) for log in logs if _direction(log) == way]
+        one_way = [_steady(log, values) for log in logs if _direction(log) == way]
         values[name] = 0.0
         covariance[at, at] = np.inf
         if not one_way:
@@ -148,19 +163,18 @@ def _friction(logs: Sequence[Log], values: dict[str, float], covariance: np.ndar
                 f"{name}: a frequency response tells no friction, but where the axis moves {where} all along"
             )
             continue
-        voltage, speed = (float(np.mean(np.concatenate([pair[i] for pair in one_way]))) for i in (0, 1))
-        friction = values["K"] * voltage - speed
+        voltage, friction = (float(np.mean(np.concatenate([pair[i] for pair in one_way]))) for i in (0, 1))
         values[name] = way * max(way * friction, 0.0)
         covariance[at, :] = covariance[:, at] = voltage * covariance[gain, :]
         covariance[at, at] = voltage**2 * covariance[gain, gain]
     return unidentifiable
 
 
-def _steady(log: Log, tau: float) -> tuple[np.ndarray, np.ndarray]:
-    """Command and mean velocity of each sample, without the beginning: what gets the axis going is no friction."""
+def _steady(log: Log, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Command, and by how much friction slows each sample, without the beginning: what gets the axis going is none."""
     u, y = output_rate(log, False)
-    begin = min(int(10.0 * tau / log.sample_period), len(u) // 2)
-    return u[begin:], y[begin:]
+    begin = min(int(10.0 * values["tau"] / log.sample_period), len(u) // 2)
+    return u[begin:], (model_rate(u, y, log.sample_period, values, False) - y)[begin:]
 
 
 def _direction(log: Log) -> float:

@@ -171,17 +171,57 @@ def _smooth(values: np.ndarray) -> np.ndarray:
     return np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same")
 
 
-def _welch(u: np.ndarray, y: np.ndarray, T: float) -> FrequencyResponse:
+def window_distortion(log: Log, response: FrequencyResponse, values: Mapping[str, float], is_rate: bool) -> np.ndarray:
+    """What the windows of Welch's method make of the model's response, over it; 1 where periods are averaged.
+
+    Where the command changes within a window, as a chirp does, the answer comes when the window weighs otherwise. That
+    is several per cent at the first and last lines of a chirp, and no coherence shows it; so the model is sent through
+    the same windows.
+    """
+    if response.period is not None:
+        return np.ones(len(response.frequency))
+    u, y = output_rate(log, is_rate)
+    frequency, s_uu, _, s_uy = _spectra(u, model_rate(u, y, log.sample_period, values, is_rate), log.sample_period)
+    at = np.searchsorted(frequency, response.frequency - 0.5 * frequency[1])
+    seen = s_uy[at] / s_uu[at]
+    return np.asarray(seen / model_response(response.frequency, log.sample_period, values, is_rate))
+
+
+def model_rate(u: np.ndarray, y: np.ndarray, T: float, values: Mapping[str, float], is_rate: bool) -> np.ndarray:
+    """The model's output rate (`model_response` over time), from the speed that the log begins with."""
+    with needed_for("a frequency response"):
+        from scipy.signal import lfilter
+
+    tau, K, delay = values["tau"], values["K"], values.get("delay", 0.0)
+    whole = min(int(delay // T), len(u) - 1)
+    part = delay / T - whole
+    h = (1.0 - part) * T
+    a, a_h = np.exp(-T / tau), np.exp(-h / tau)
+    late = np.concatenate([np.full(whole + 1, u[0]), u])[: len(u) + 1]
+    newer, older = late[1:], late[:-1]  # of the two commands that act within a sample
+    begin = float(np.mean(y[:5])) + K * float(np.mean(u)) - float(np.mean(y))  # friction is in the mean
+    speed = lfilter([1.0], [1.0, -a], np.concatenate([[begin], K * ((1.0 - a_h) * newer + (a_h - a) * older)]))
+    if is_rate:
+        return np.asarray(speed[:-1])
+    return np.asarray(K * (h * newer + part * T * older) - tau * np.diff(speed)) / T
+
+
+def _spectra(u: np.ndarray, y: np.ndarray, T: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Frequencies (Hz), and the spectra of `u`, of `y` and across, by Welch's method."""
     with needed_for("a frequency response"):
         from scipy.signal import csd, welch
 
     length = len(u) // _SEGMENTS
-    if length < 32:
-        raise InputError(f"{len(u)} samples are too few for a frequency response; it takes {32 * _SEGMENTS} or more")
     settings: dict[str, Any] = {"fs": 1.0 / T, "window": "hann", "nperseg": length, "detrend": "linear"}
     frequency, s_uu = welch(u, **settings)
-    _, s_yy = welch(y, **settings)
-    _, s_uy = csd(u, y, **settings)
+    return frequency, s_uu, welch(y, **settings)[1], csd(u, y, **settings)[1]
+
+
+def _welch(u: np.ndarray, y: np.ndarray, T: float) -> FrequencyResponse:
+    length = len(u) // _SEGMENTS
+    if length < 32:
+        raise InputError(f"{len(u)} samples are too few for a frequency response; it takes {32 * _SEGMENTS} or more")
+    frequency, s_uu, s_yy, s_uy = _spectra(u, y, T)
     windows = (len(u) - length) // (length - length // 2) + 1
     averages = windows * 0.95 if windows < 3 else 9.0 * windows / 11.0  # Hann, half overlap (Welch 1967)
     with np.errstate(divide="ignore", invalid="ignore"):

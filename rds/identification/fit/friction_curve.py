@@ -4,8 +4,10 @@ At constant speed nothing accelerates, so the command is all friction:
 
     g u = ± (F_c + (F_s - F_c) e^(-(v/v_s)²)) + F_v v
 
-Each steady stretch is a point; the points of each direction are fitted by themselves. What they cannot tell is said:
-inertia and time constant at all, static friction below the slowest speed, viscous friction from one speed.
+Each steady stretch is a point; the points of each direction are fitted by themselves. A standard error is the larger
+of two: that by the scatter of the points about the curve, and that by what each point's own samples leave open, which
+alone holds where there are no more points than numbers. What the points cannot tell is said: inertia and time constant
+at all, static friction below the slowest speed, viscous friction from one speed.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
+from rds.identification.fit.made_estimate import t_quantile
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.logs.log import Log
 from rds.identification.structures.signals import PER_SI, POSITIONS, ROTARY, SPEEDS
@@ -29,7 +32,7 @@ _ALIKE = 0.05  # by which the windows of a stretch may differ in speed
 _WINDOWS = 3  # of a stretch, at least: two windows at the turn of a sine look steady, too
 _SAME_SPEED = 1.15  # ratio of speeds that count as one
 _GRID = 25  # speeds v_s that are tried
-_BETTER = 3.0  # standard errors by which Stribeck's part must differ from none
+_BETTER = 1.5  # half intervals (of many points three standard errors) by which Stribeck's part must differ from none
 _STEPS = 5.0  # of an encoder, that a window must move
 
 
@@ -47,11 +50,13 @@ class SteadyPoint:
 
 @dataclass(frozen=True)
 class Told:
-    """A number of the curve with its standard error."""
+    """A number of the curve with its standard error, and the 95 % interval (Student's t where points are few)."""
 
     value: float
     std_error: float
     unit: str
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -183,39 +188,63 @@ def _fitted(
     """The numbers of one direction, and what its points cannot tell."""
     v = np.array([way * point.speed for point in points])
     f = np.array([way * point.force for point in points])
+    own = np.array([point.error for point in points])
     slowest, fastest = float(v.min()), float(v.max())
     speeds = int(np.count_nonzero(np.diff(np.sort(v)) > (_SAME_SPEED - 1.0) * np.sort(v)[:-1])) + 1
     said = [f"static friction, and anything below {slowest:.3g} {speed_unit}, the slowest of these points"]
     if speeds < 2:
-        error = float(f.std(ddof=1) / np.sqrt(len(f))) if len(f) > 1 else float(points[0].error)
         said.append(f"viscous friction: all runs are at {v.mean():.3g} {speed_unit}, and F_c is all friction there")
-        return {"F_c": Told(float(f.mean()), error, force_unit)}, said
+        mean = _Solved(np.ones((len(f), 1)), np.array([f.mean()]), f - f.mean(), own)
+        return {"F_c": mean.told(np.ones(1), force_unit)}, said
     per_si, unit = _viscous(output, force_unit)
-    plain = _linear(v, f, None)
-    numbers = {
-        "F_c": Told(float(plain[0][0]), float(plain[1][0]), force_unit),
-        "F_v": Told(float(plain[0][1]) * per_si, float(plain[1][1]) * per_si, unit),
-    }
+    plain = _linear(v, f, own, None)
+    coulomb, slope = np.eye(2)
+    numbers = {"F_c": plain.told(coulomb, force_unit), "F_v": plain.told(per_si * slope, unit)}
     if speeds < 5:
         said.append(f"Stribeck's part: {speeds} speeds are too few, 5 or more are needed")
         return numbers, said
     grid = np.geomspace(0.3 * slowest, 0.5 * fastest, _GRID)
-    best = min(grid, key=lambda vs: _linear(v, f, float(vs))[2])
-    theta, errors, left = _linear(v, f, float(best))
-    rise, sure = float(theta[2]), float(errors[2])
-    if not rise > _BETTER * sure or left > 0.5 * plain[2] or best <= grid[0]:
+    solved = {float(vs): _linear(v, f, own, float(vs)) for vs in grid}
+    best = min(solved, key=lambda vs: solved[vs].left)
+    rise = solved[best].told(np.array([0.0, 0.0, 1.0]), force_unit)
+    if not rise.value > _BETTER * (rise.high - rise.value) or solved[best].left > 0.5 * plain.left or best <= grid[0]:
         said.append(
             f"Stribeck's part: from {slowest:.3g} to {fastest:.3g} {speed_unit} the points are on a line as well; go "
             "slower"
         )
         return numbers, said
-    return _stribeck(v, f, theta, float(best), speed_unit, force_unit, output), said
+    return _stribeck(v, f, own, solved[best].values, best, speed_unit, force_unit, output), said
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """Least squares over points: slopes (points, n), values (n,), what is left, and each point's own standard error."""
+
+    slopes: np.ndarray
+    values: np.ndarray
+    residual: np.ndarray
+    own: np.ndarray
+
+    @property
+    def left(self) -> float:
+        return float(np.sum(self.residual**2))
+
+    def told(self, row: np.ndarray, unit: str) -> Told:
+        """The number `row @ values`."""
+        weights = self.slopes @ np.linalg.pinv(self.slopes.T @ self.slopes) @ row  # of each point in it
+        freedom = len(self.residual) - len(self.values)
+        scatter = float(np.linalg.norm(weights)) * np.sqrt(self.left / freedom) if freedom > 0 else 0.0
+        within = float(np.linalg.norm(weights * self.own))
+        reach = max(t_quantile(freedom) * scatter, t_quantile(np.inf) * within)
+        value = float(row @ self.values)
+        return Told(value, max(scatter, within), unit, value - reach, value + reach)
 
 
 def _stribeck(
-    v: np.ndarray, f: np.ndarray, theta: np.ndarray, vs: float, speed_unit: str, force_unit: str, output: str
-) -> dict[str, Told]:
-    """All four numbers, refined together from the best of the grid, with standard errors."""
+    v: np.ndarray, f: np.ndarray, own: np.ndarray, theta: np.ndarray, vs: float, speed_unit: str, force_unit: str,
+    output: str,
+) -> dict[str, Told]:  # fmt: skip
+    """All four numbers, refined together from the best of the grid."""
     with needed_for("a friction curve"):
         from scipy.optimize import least_squares
 
@@ -223,31 +252,22 @@ def _stribeck(
         return p[0] + p[1] * v + p[2] * np.exp(-((v / (p[3] * vs)) ** 2)) - f
 
     found = least_squares(miss, np.append(theta, 1.0), x_scale="jac")
-    freedom = max(len(v) - 4, 1)
-    slopes = np.asarray(found.jac)
-    covariance = np.linalg.pinv(slopes.T @ slopes) * 2.0 * found.cost / freedom
+    solved = _Solved(np.asarray(found.jac), found.x, found.fun, own)
     per_si, viscous_unit = _viscous(output, force_unit)
-    c, viscous, rise, width = np.eye(4)
-    rows = {
-        "F_c": (c, 1.0, force_unit),
-        "F_v": (viscous, per_si, viscous_unit),
-        "F_s": (c + rise, 1.0, force_unit),
-        "v_s": (width * np.sign(found.x[3]), vs, speed_unit),
-    }
+    coulomb, slope, rise, width = np.eye(4)
     return {
-        name: Told(times * float(row @ found.x), times * float(np.sqrt(max(row @ covariance @ row, 0.0))), unit)
-        for name, (row, times, unit) in rows.items()
+        "F_c": solved.told(coulomb, force_unit),
+        "F_v": solved.told(per_si * slope, viscous_unit),
+        "F_s": solved.told(coulomb + rise, force_unit),
+        "v_s": solved.told(vs * np.sign(found.x[3]) * width, speed_unit),
     }
 
 
-def _linear(v: np.ndarray, f: np.ndarray, vs: float | None) -> tuple[np.ndarray, np.ndarray, float]:
-    """Coefficients of 1, v and (with `vs`) Stribeck's exponential, their standard errors, and the squares left."""
+def _linear(v: np.ndarray, f: np.ndarray, own: np.ndarray, vs: float | None) -> _Solved:
+    """Coefficients of 1, v and (with `vs`) Stribeck's exponential."""
     A = np.column_stack([np.ones_like(v), v, *([] if vs is None else [np.exp(-((v / vs) ** 2))])])
     theta = np.linalg.lstsq(A, f, rcond=None)[0]
-    left = float(np.sum((f - A @ theta) ** 2))
-    freedom = max(len(v) - A.shape[1], 1)
-    covariance = np.linalg.pinv(A.T @ A) * left / freedom
-    return theta, np.sqrt(np.maximum(np.diag(covariance), 0.0)), left
+    return _Solved(A, theta, f - A @ theta, own)
 
 
 def _viscous(output: str, force_unit: str) -> tuple[float, str]:

@@ -16,6 +16,7 @@ from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Paramete
 from rds.identification.fit.free_run_doubts import held_doubts, leap_doubts, other_doubts
 from rds.identification.fit.initial_state import estimate_start, initial_samples
 from rds.identification.fit.kstep import ahead, errors_of
+from rds.identification.fit.smoothing import speed_range
 from rds.identification.logs.excitation import is_steady
 from rds.identification.logs.fingerprint import fingerprint
 from rds.identification.logs.log import Gravity, Log
@@ -216,9 +217,6 @@ def _errors(
     return errors_of(measured, modelled, structure.output_unit), ahead(measured, modelled, structure.output_unit)
 
 
-_SMOOTH = 0.01  # s over which velocities are taken: an encoder's step in one sample is no speed
-
-
 def fitted_stretch(log: Log) -> dict[str, Any]:
     """What an estimate, and the model file made of it, say of a log that was fitted: `Estimate.logs` holds these.
 
@@ -226,8 +224,6 @@ def fitted_stretch(log: Log) -> dict[str, Any]:
     position (mm) with the encoder's resolution, where one was logged; the fingerprint and the trace by which the data
     are known again under another name, or with noise.
     """
-    step = max(round(_SMOOTH / log.sample_period), 1)
-    rate = log.position if log.is_rate else _slopes(log, min(step, len(log) - 1))
     found: dict[str, Any] = {
         "name": log.name,
         "source": log.source,
@@ -235,15 +231,10 @@ def fitted_stretch(log: Log) -> dict[str, Any]:
         "first": log.first,
         "end": log.first + len(log),
         "command": (float(log.command.min()), float(log.command.max())),
-        "velocity": (float(rate.min()), float(rate.max())),
+        "velocity": speed_range(log),
     }
     if not log.is_rate:
         found["position"] = (float(log.position.min()), float(log.position.max()))
         found |= {"resolution": float(log.resolution)} if log.resolution else {}
     found |= {"fingerprint": hashes} if (hashes := fingerprint(log)) else {}
     return found | ({"trace": places} if (places := trace(log)) else {})
-
-
-def _slopes(log: Log, step: int) -> np.ndarray:
-    """Mean velocities over `step` samples."""
-    return (log.position[step:] - log.position[:-step]) / (log.time[step:] - log.time[:-step])

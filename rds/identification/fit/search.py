@@ -27,6 +27,8 @@ _EXACT = 1e-6  # of the motion: residuals of data without noise
 _AGAIN = 1e-3  # of the sum of squares: two searches that end nearer than this end at the same place
 _LITTLE = 0.02  # of what an option begins with: hardly any effect, but a derivative
 _GLIMPSE = 30  # free runs of a search from another start
+_BY_LEAPS = ("stribeck",)  # whether the axis sticks or breaks away hangs on it: beside the best place are others
+_APART = (0.5, 2.0)  # times such a parameter: where a search begins again
 _TOUCHES = 1e-9  # of the units used: what is nearer to a bound has run into it
 _SAME = 0.01  # of the noise: runs that differ by less are the same
 
@@ -134,6 +136,16 @@ def _search(problem: Problem, starts: Iterable[Start]) -> Found:
     if not best.converged and tried > 1:
         end = least_squares(problem, best.point)
         best = end if end.squares <= best.squares else best
+    for number in (number for number, name in enumerate(problem.names) if name in _BY_LEAPS):
+        for times in _APART:
+            point = best.point.copy()
+            point[number] *= times
+            try:
+                beside = least_squares(problem, point, _GLIMPSE)
+            except InputError:  # the free run from there is not finite
+                continue
+            best = beside if beside.squares < (1.0 - _AGAIN) * best.squares else best
+            tried += 1
     for number, name in enumerate(problem.names):
         if not stands_at_bound(problem, best, number) or _explains(problem, best):
             continue

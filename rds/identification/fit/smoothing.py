@@ -12,6 +12,9 @@ from rds.identification.logs.motion import noise as noise_of
 _LONGEST = 0.05  # of a log: the widest difference that a velocity is taken over
 _SLOW = 0.03  # of the highest speed: slower is taken for rest
 _STILL = 12.0  # noise alone spans 8 standard deviations in 10^4 samples, 10.4 in 10^7
+_SPAN = 0.01  # s over which a range of velocities is taken: an encoder's step in one sample is no speed
+_ROUGH = 0.2  # of the highest speed: what noise a velocity of that range may have
+_REACH = 3.0  # standard deviations by which noise makes the fastest velocities faster
 _NOISY = 0.05  # of the highest speed: what noise a velocity may have
 
 
@@ -46,6 +49,23 @@ def _motion_of(log: Log) -> Motion:
         if uncertain <= _NOISY * fastest or 2 * half > longest:
             return Motion(noise, velocity, max(2.0 * uncertain, _SLOW * fastest), moves)
         half *= 2
+
+
+def speed_range(log: Log) -> tuple[float, float]:
+    """The lowest and highest velocity of a log, mm/s, less what noise adds to them; of a speed its own."""
+    y, t = log.position, log.time
+    if log.is_rate:
+        return float(y.min()), float(y.max())
+    step, longest = max(round(_SPAN / log.sample_period), 1), max(int(_LONGEST * len(y)), 1)
+    while True:
+        step = min(step, len(y) - 1)
+        rate = (y[step:] - y[:-step]) / (t[step:] - t[:-step])
+        low, high = float(rate.min()), float(rate.max())
+        unsure = motion_of(log).noise * np.sqrt(2.0) / (step * log.sample_period)
+        if unsure <= _ROUGH * max(-low, high) or 2 * step > longest:
+            extra = float(min(_REACH * unsure, 0.5 * (high - low)))
+            return low + extra, high - extra
+        step *= 2
 
 
 def _difference(t: np.ndarray, y: np.ndarray, half: int) -> np.ndarray:

@@ -59,7 +59,9 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     order = list(structure.parameters)
     covariance = np.zeros((len(order), len(order)))
     places = [order.index(name) for name in names]
-    covariance[np.ix_(places, places)] = spread.covariance
+    errors = np.sqrt(np.diag(spread.covariance))  # by few samples at the onset of steps: too small by chance
+    wider = np.divide(spread.ordinary, errors, out=np.ones(len(names)), where=np.isfinite(errors) & (errors > 0.0))
+    covariance[np.ix_(places, places)] = spread.covariance * np.outer(wider.clip(1.0), wider.clip(1.0))
     for name in unidentifiable:
         covariance[order.index(name), order.index(name)] = np.inf
     way = {"friction_plus": "forward", "friction_minus": "backward"}
@@ -123,7 +125,8 @@ def _solve(
     start, _ = min(starts, key=lambda item: item[1])
     is_delay = np.array([name == "delay" for name in names])
     scale = np.where(is_delay, shortest, np.maximum(np.abs(start), 1e-3))
-    # differences are relative, and of a delay of 0 nothing would be left: it is counted from a sample before
+    # differences are relative, and of a delay of 0 nothing would be left: it is counted from a sample before. It begins
+    # at one sample, because a search that begins at a bound may stay there
     zero = np.where(is_delay, -shortest, 0.0)
 
     def misses(point: np.ndarray) -> np.ndarray:
@@ -131,10 +134,10 @@ def _solve(
 
     low = np.array([1e-3 * shortest if name == "tau" else 0.0 if name == "delay" else -np.inf for name in names])
     high = np.where(is_delay, 0.5 * longest, np.inf)
+    begin = np.where(is_delay, np.minimum(shortest, 0.5 * high), np.clip(start, low, high))
     found = least_squares(
-        misses, np.clip(start, low, high) - zero, "3-point", (low - zero, high - zero), x_scale=scale,
-        diff_step=np.full(len(names), _STEP),
-    )  # fmt: skip
+        misses, begin - zero, "3-point", (low - zero, high - zero), x_scale=scale, diff_step=np.full(len(names), _STEP)
+    )
     lengths = [window.end - window.first for _, window in windows]
     return dict(zip(names, (found.x + zero).tolist(), strict=True)), -found.fun, np.asarray(found.jac), lengths
 

@@ -65,7 +65,7 @@ def is_number(cell: str, decimal: str) -> bool:
         float(cell)
     except ValueError:
         return False
-    return cell.lower() not in BLANKS and "_" not in cell
+    return cell.lower() not in BLANKS and "_" not in cell and cell.isascii()  # Arrow knows no digits of other scripts
 
 
 def stamped(rows: Sequence[Sequence[str]], decimal: str) -> str:

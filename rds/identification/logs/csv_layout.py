@@ -88,7 +88,10 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     if best is None:
         shown = next((line for line in lines if line.strip()), "")
         remedy = "it needs columns of numbers, separated by commas, semicolons, tabs, bars or spaces"
-        if quoted and decimal is None:
+        told = [line.strip() for line in lines if line.strip()]
+        if all(line.count('"') == 2 and line[0] == line[-1] == '"' for line in told):
+            remedy = "each line as a whole stands in quotation marks; take them off: `tr -d '\"' < FILE > log.csv`"
+        elif quoted and decimal is None:
             remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
         if shown.lstrip().startswith("{"):
             remedy = "its lines are JSON: in Python `pandas.read_json(FILE, lines=True).to_csv('log.csv', index=False)`"
@@ -129,6 +132,11 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         and not any(is_number(row[i], point) for row in body)
         and any(row[i].lower() not in BLANKS for row in body)
     )
+    if mark == " " and width - 1 in words and all(is_number(row[-1].rstrip("];"), point) for row in body[:_FEW]):
+        what = (
+            "its rows end in ';', as a matrix is typed in MATLAB, so that its first row and last column cannot be read"
+        )
+        raise InputError(f"{what}; take the marks off: `tr -d '[];' < FILE > log.txt`", str(path))
     times = times or (tuple(range(0, width, 2)) if alternates(units) else ())
     announced = _announced(lines[:first])
     numbers = [i for i in range(width) if any(is_number(row[i], point) for row in body[:_FEW])]

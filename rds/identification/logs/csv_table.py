@@ -237,7 +237,7 @@ def _read(
     except pa.ArrowInvalid as error:
         if refused:
             raise _line_fault(path, layout, refused[0].text, refused[0].actual_columns) from error
-        found_column = re.search(r"CSV column #(\d+): CSV conversion error", str(error))
+        found_column = re.search(r"CSV column #(\d+):(?: Row #\d+:)? CSV conversion error", str(error))
         if found_column is None or int(found_column[1]) in words:
             raise InputError(f"it cannot be read as a table: {error}", str(path)) from error
         raise _NotNumber(int(found_column[1])) from error

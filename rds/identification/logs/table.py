@@ -16,6 +16,7 @@ from rds.identification.logs.log import Finding
 
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}([ T,]|$)")
 _OF_DAY = re.compile(r"(\d+ days? )?\d{1,2}:\d\d\b")
+_POINT = re.compile(r"[+-]?[0-9]+\.[0-9]+")
 _OTHER_THOUSANDS = re.compile(r"[+-]?\d{1,3}([.'\u2019\u00a0\u202f ])\d{3}(\1\d{3})*(,\d+|\.\d+)?")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
@@ -88,6 +89,11 @@ def remedy(cell: str) -> str:
         )
     if _OF_DAY.match(cell):
         return "write times of day as 13:00:00.001 (24 hours, a point before the fraction), spans as s"
+    if _POINT.fullmatch(cell):  # no number where decimal commas were found, or said
+        return (
+            "every cell must be a number: export the file without a sign that parts the thousands, and with the same "
+            "decimal sign in every cell"
+        )
     if _OTHER_THOUSANDS.fullmatch(cell):
         return "every cell must be a number: export the file without a sign that parts the thousands"
     if _THOUSANDS.fullmatch(cell):

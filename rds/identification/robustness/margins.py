@@ -22,6 +22,7 @@ from rds.models.machine_model import MachineAxisMotion, linear_part, split_delay
 
 GRID = 800  # frequencies, logarithmic up to Nyquist's
 _DECADES = 5.0
+_REAL = 1e-6  # imaginary part of a loop at Nyquist's frequency, where rounding alone leaves one
 _LARGEST_DELAY = 200  # samples: beyond, no poles are computed
 
 
@@ -122,7 +123,8 @@ def margins_of(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
 
     The gain margin is the least factor, up or down, at which a stable loop comes to its limit, as in python-control's
     `stability_margins`: an integrating law on an axis is often unstable with less gain, too.
-    A loop that is below 1 at the first frequency, and integrates, has the phase margin of its phase there.
+    A loop that is below 1 at the first frequency, and integrates, has the phase margin of its phase there. At Nyquist's
+    frequency, if that is the last one, a loop is real and may end on the negative axis without a crossing.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         size, phase = np.log(np.abs(loop)), np.unwrap(np.angle(loop), axis=1)
@@ -132,7 +134,9 @@ def margins_of(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
         level = np.maximum(lap[:, 1:], lap[:, :-1]) * 2.0 * np.pi
         share = (level - turned[:, :-1]) / (turned[:, 1:] - turned[:, :-1])
         there = size[:, :-1] + share * (size[:, 1:] - size[:, :-1])
-        gain = np.where(crossing, np.abs(there), np.inf).min(axis=1) * 20.0 / np.log(10.0)
+        last = loop[:, -1]
+        ends = np.where((last.real < 0.0) & (np.abs(last.imag) < _REAL * np.abs(last)), np.abs(size[:, -1]), np.inf)
+        gain = np.minimum(np.where(crossing, np.abs(there), np.inf).min(axis=1), ends) * 20.0 / np.log(10.0)
         unity = (size[:, 1:] > 0.0) != (size[:, :-1] > 0.0)
         share = -size[:, :-1] / (size[:, 1:] - size[:, :-1])
         angle = turned[:, :-1] + share * (turned[:, 1:] - turned[:, :-1])

@@ -89,12 +89,11 @@ class _Start:
         self.options = options
 
     def __call__(self, logs: Sequence[Log]) -> list[tuple[dict[str, float], list[tuple[float, ...]]]]:
-        if not any(np.ptp(log.position) > 0.0 and np.ptp(log.command) > 0.0 for log in logs):
-            what = "speed" if any(np.ptp(log.command) > 0.0 for log in logs) else "command"
+        # a log may begin with its step: the speed then changes under a command that is the same throughout
+        if not any(np.ptp(log.position) > 0.0 and np.any(log.command) for log in logs):
+            what = "speed never changes" if any(np.any(log.command) for log in logs) else "command is 0 throughout"
             names = ", ".join(log.name for log in logs)
-            raise InputError(
-                f"the {what} never changes, so there is nothing to tell a time constant or gain from", names
-            )
+            raise InputError(f"the {what}, so there is nothing to tell a time constant or gain from", names)
         states: list[tuple[float, ...]] = [(float(log.position[0]),) for log in logs]
         candidates = []
         for step in np.unique(np.geomspace(1, max(min(len(log) for log in logs) // 8, 1), 12).astype(int)):

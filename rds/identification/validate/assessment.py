@@ -16,6 +16,7 @@ from rds.identification.fit.initial_state import initial_samples as usual_sample
 from rds.identification.fit.kstep import STEPS, ahead, errors_of
 from rds.identification.fit.needed_voltage import NeededVoltage, needed_voltage, smoothed_velocity
 from rds.identification.fit.residuals import LONGEST, ResidualTest, bandwidth, block_length, block_means, residual_tests
+from rds.identification.fit.smoothing import speed_range
 from rds.identification.logs.log import Log
 from rds.identification.logs.motion import noise
 from rds.identification.validate.attainable import Attainable, attainable
@@ -153,7 +154,7 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None, b
         "block_modelled": rates[1],
         "noise": max(noise(y[:LONGEST]), (log.resolution or 0.0) / sqrt(12.0)),
         "overlap": overlap(candidate, log),
-        "ranges": _ranges(candidate, log, rates[0]),
+        "ranges": _ranges(candidate, log),
     }
     unit = log.units.get("position", "mm")
     if unstable_at is not None:
@@ -319,11 +320,10 @@ def _voltage(candidate: Candidate, log: Log, block: int) -> NeededVoltage:
     return needed_voltage(log, candidate.structure, candidate.values, velocity, window, candidate.is_rate)
 
 
-def _ranges(candidate: Candidate, log: Log, velocity: np.ndarray) -> dict[str, Range]:
+def _ranges(candidate: Candidate, log: Log) -> dict[str, Range]:
     unit = log.units.get("position", "mm")
-    speed = (float(velocity.min()), float(velocity.max())) if len(velocity) else (0.0, 0.0)
     command = (float(log.command.min()), float(log.command.max()))
     return {
         "command": Range(command, candidate.range_of("command"), log.units.get("command", "V")),
-        "velocity": Range(speed, candidate.range_of("velocity"), unit if candidate.is_rate else f"{unit}/s"),
+        "velocity": Range(speed_range(log), candidate.range_of("velocity"), unit if candidate.is_rate else f"{unit}/s"),
     }
