@@ -24,8 +24,9 @@ OTHER = 0x6F00ABCD  # a user that has no name
 
 
 @pytest.fixture
-def usual(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def usual(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """The usual folder, not made yet, in a temporary folder that all may write to, and a home beside that."""
+    tmp_path_factory.getbasetemp()  # which pytest makes in the temporary folder of when it is first asked for
     with tempfile.TemporaryDirectory(prefix="rds", dir="/tmp") as base:
         monkeypatch.delenv("XDG_RUNTIME_DIR")
         monkeypatch.delenv("XDG_STATE_HOME", raising=False)
