@@ -41,7 +41,9 @@ def test_a_host_that_dies_with_all_its_processes(bench: Bench, tmp_path: Path) -
     run = start(bench, tmp_path)
     wait_for(lambda: (tmp_path / "out" / "record.rds").exists() and bench.powered())
     processes = json.loads((tmp_path / "out" / "processes.json").read_text())
-    for pid in (run.pid, processes["recorder"], processes["target"]):
+    # first what does the work, a child of the command: it would tell the end of the recorder
+    hosts = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
+    for pid in (*map(int, hosts), run.pid, processes["recorder"], processes["target"]):
         os.kill(pid, signal.SIGKILL)
     bench.stands_without_voltage()
     left = open_result(tmp_path / "out")
