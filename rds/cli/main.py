@@ -45,6 +45,7 @@ from rds.cli import (
     jog,
     learn,
     library,
+    machine_serve,
     machine_watch,
     machines,
     modules,
@@ -57,7 +58,6 @@ from rds.cli import (
     validate,
 )
 from rds.cli.app import app as app_page
-from rds.cli.buses import Channel, Experiment, Interface, bus_table_of
 from rds.cli.common import (
     Explain,
     Json,
@@ -151,6 +151,8 @@ for command in (machines.new, machines.show, machines.pose, machines.joints, mac
 machine_app.command()(calibrate.calibrate)
 machine_app.command("modules")(machines.modules)
 machine_app.command("watch")(machine_watch.watch)
+machine_app.command("list")(machine_serve.list_machines)
+machine_app.command("serve", cls=library.NamesParts)(machine_serve.serve)
 
 
 def _print_version(is_asked: bool) -> None:
@@ -287,92 +289,6 @@ def compare(
         print_json(comparison.to_json())
     else:
         typer.echo(str(comparison))
-
-
-@machine_app.command("list")
-def machine_list(json: Json = False) -> None:
-    """The machines that come with the package."""
-    from rds.machines import load_machine, machine_names
-
-    machines = [load_machine(name) for name in machine_names()]
-    if json:
-        print_json({m.name: {"title": m.title, "axes": list(m.axes), "file": m.path} for m in machines})
-        return
-    for machine in machines:
-        typer.echo(f"{machine.name}: {machine.title}")
-        for axis in machine.axes.values():
-            low, high = axis.travel
-            typer.echo(f"  {axis.name:8} node {axis.node}, {low:g} to {high:g} {axis.unit}")
-
-
-@machine_app.command("serve", cls=library.NamesParts)
-def machine_serve(
-    name: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
-    interface: Interface = None,
-    channel: Channel = None,
-    experiment: Experiment = None,
-    dialect: Annotated[
-        str | None,
-        typer.Option(help="What the modules speak: {dialect}; by default as in \\[bus], or rds."),
-    ] = None,
-    bitrate: Annotated[
-        int | None, typer.Option(min=1, help="Bit rate, bit/s; without it the built-in bus has no bit timing.")
-    ] = None,
-    faults: Annotated[Path | None, typer.Option(help="TOML file of faults to inject (built-in bus).")] = None,
-    drift: Annotated[
-        str | None, typer.Option(help="How much too fast clocks of modules go, ppm: X=50,Y=-30 (dialects rds, dcs).")
-    ] = None,
-    quirks: Annotated[
-        str | None,
-        typer.Option(
-            help="What is wrong with simulated drives: wrong-sign, wrong-gear, zero-limits, closed-brake, "
-            "fixed-mapping, no-node-id."
-        ),
-    ] = None,
-    eds: Annotated[
-        Path | None,
-        typer.Option(help="EDS of another drive: the simulated ones have its objects and identity (dialect cia402)."),
-    ] = None,
-    axes: Annotated[
-        str | None,
-        typer.Option(help="Only these modules, as in X,Z: end this command and they are unplugged. By default all."),
-    ] = None,
-    cut: Annotated[
-        Path | None, typer.Option(help="What the machine cuts (TOML): its load cell measures the force (dialect rds).")
-    ] = None,
-) -> None:
-    """Run the machine's axis modules as CAN nodes, or as units on a serial line (--dialect dcs), until Ctrl-C."""
-    with refusals():
-        from rds.bus.modules.dialects import DEFAULT, check_served_with, interface_of, serve_machine
-        from rds.bus.tools.link import BUILTIN, bus_name, bus_options, default_channel
-        from rds.machines import load_machine
-
-        machine = load_machine(name)
-        table = bus_table_of(experiment, interface, channel)
-        spoken = dialect or table.get("dialect", DEFAULT)
-        where = interface_of(spoken, str(table.get("interface", BUILTIN)))
-        place = default_channel(machine, where, table.get("channel"))
-
-        names = None if axes is None else [machine.axis(name.strip()).name for name in axes.split(",")]
-
-        def ready() -> None:
-            typer.echo(
-                f"{machine.name}: {', '.join(names or machine.axes)} on {bus_name(where, place)}; Ctrl-C ends", err=True
-            )
-
-        options = bus_options(table)  # its faults are the run's, and [bus.cia402] tells a host of its drives
-        if bitrate is not None:
-            options["bitrate"] = bitrate
-        own = {"drift": drift, "quirks": quirks, "eds": eds, "cut": None if cut is None else str(cut)}
-        for option, value in own.items():
-            if value is not None:
-                check_served_with(spoken, option, value)
-                options[option] = value
-        if faults is not None:
-            from rds.bus.medium.fault_file import read_faults
-
-            options["faults"] = read_faults(faults)
-        serve_machine(machine, spoken, where, place, ready, axes=names, **options)
 
 
 def _name_of(command: CommandInfo) -> str:
