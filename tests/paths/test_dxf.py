@@ -116,10 +116,23 @@ def test_curves_of_a_block_keep_within_the_chord_error_at_the_size_that_they_get
     assert np.ptp(np.unwrap(np.arctan2(points[:, 1], points[:, 0]))) == pytest.approx(2 * pi, abs=0.1)
 
 
-def test_a_spline_of_fit_points_alone_is_told(drawn: Read) -> None:
-    drawing = drawn("0 SPLINE 8 a 70 8 71 3 74 3 11 0 21 0 11 5 21 5 11 9 21 0")
-    assert len(drawing.curves[0].points) == 3
-    assert "straight lines go through them" in " ".join(drawing.notes)
+def test_a_spline_of_fit_points_alone_is_a_smooth_curve_through_them_and_told(drawn: Read) -> None:
+    fit = "11 0 21 0 11 5 21 5 11 10 21 0"
+    drawing = drawn(f"0 SPLINE 8 a 70 8 71 3 74 3 {fit}")
+    chord = 50**0.5
+    u = np.linspace(0, 1, 1001)  # the natural cubic of three places, by hand
+    half = np.column_stack((5 * u, 5 * u + 2.5 * (u - u**3)))
+    points = drawing.curves[0].points
+    rising = points[points[:, 0] <= 5]
+    assert np.interp(rising[:, 0], *half.T) == pytest.approx(rising[:, 1], abs=1e-3)
+    assert "through its fit points" in " ".join(drawing.notes)
+    # where it states tangents, it begins and ends along them; where it is closed, it comes back without a corner
+    points = drawn(f"0 SPLINE 8 a 70 8 71 3 74 3 12 0 22 {chord} 13 0 23 -1 {fit}").curves[0].points
+    assert np.arctan2(*(points[1] - points[0])) == pytest.approx(0, abs=0.05)
+    assert np.arctan2(*(points[-2] - points[-1])) == pytest.approx(0, abs=0.05)
+    points = drawn(f"0 SPLINE 8 a 70 9 71 3 74 3 {fit}").curves[0].points
+    first, last = points[1] - points[0], points[-1] - points[-2]
+    assert np.dot(first, last) == pytest.approx(np.hypot(*first) * np.hypot(*last), rel=0.01)
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])

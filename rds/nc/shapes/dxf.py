@@ -219,7 +219,7 @@ class _Reader:
         elif kind == "SPLINE":
             self._add(_spline(body, _size(m), self.name), bool(int(number_of(body, 70)) & 1), layer, m)
             if not len(places_of(body, 10)):
-                self._pass_over("the shape of a spline with fit points alone: straight lines go through them")
+                self._pass_over("control points, which a spline lacks: a natural cubic goes through its fit points")
         elif kind == "INSERT":
             self._insert(body, layer, m, depth)
         else:
@@ -314,14 +314,38 @@ def _ellipse(body: Pairs, scale: float) -> np.ndarray:
     return np.column_stack((x + c * mx - s * ratio * my, y + c * my + s * ratio * mx))
 
 
+def _through(fit: np.ndarray, body: Pairs) -> tuple[np.ndarray, np.ndarray]:
+    """Knots and control points of a cubic spline through `fit` (n, 2), as CAD programs draw it: over the lengths of its
+    chords, with the tangents that the entity states at its ends, natural where it states none.
+    """
+    from scipy.interpolate import make_interp_spline  # takes half a second to import
+
+    is_closed = bool(int(number_of(body, 70)) & 1)
+    points = np.vstack((fit, fit[:1])) if is_closed else fit
+    points = points[np.append(True, np.any(np.diff(points, axis=0), axis=1))]  # a point twice has no chord
+    chords = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+    if is_closed:
+        spline = make_interp_spline(chords, points, bc_type="periodic")
+    else:
+        ends = []
+        for code in (12, 13):
+            tangent = np.array([number_of(body, code), number_of(body, code + 10)])
+            length = float(np.hypot(*tangent))
+            ends.append([(1, tangent / length)] if length else [(2, np.zeros(2))])
+        spline = make_interp_spline(chords, points, bc_type=tuple(ends))  # type: ignore[arg-type]  # as scipy's page says
+    return spline.t, spline.c
+
+
 def _spline(body: Pairs, scale: float, name: str) -> np.ndarray:
-    """A (rational) B-spline by de Boor's recursion; one of fit points alone as lines through them."""
+    """A (rational) B-spline by de Boor's recursion; one of fit points alone as a cubic through them."""
     degree = int(number_of(body, 71, 3.0))
     knots, weights = np.array(numbers_of(body, 40)), np.array(numbers_of(body, 41))
     control, fit = places_of(body, 10), places_of(body, 11)
+    if not len(control) and len(fit):
+        if len(fit) < 3 or np.ptp(fit, axis=0).max() == 0.0:
+            return fit
+        degree, knots, control, weights = 3, *_through(fit, body), np.array([])
     n = len(control)
-    if n == 0 and len(fit):
-        return fit
     if n <= degree or degree < 1 or len(knots) != n + degree + 1 or (len(weights) not in (0, n)):
         raise InputError("a spline's knots and control points do not belong together; explode it into lines", name)
     w = weights if len(weights) else np.ones(n)
