@@ -188,6 +188,15 @@ def test_distances_between_the_frames_of_an_asc_are_not_taken_for_times(tmp_path
             list(LogFile(path))
 
 
+def test_a_log_of_busmaster_goes_on_past_midnight(tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(
+        BUSMASTER.replace("10:18:59:2065", "23:59:59:9999").replace("10:18:59:2070", "0:0:0:0009")
+    )
+    first, second, third = (message.timestamp for message in LogFile(tmp_path / "a.log"))
+    assert third - second == pytest.approx(0.001, abs=1e-6)
+    assert second - first == pytest.approx(13 * 3600 + 41 * 60 + 0.7949, abs=1e-6)
+
+
 def test_distances_between_the_frames_of_busmaster_are_not_taken_for_times(tmp_path: Path) -> None:
     (tmp_path / "a.log").write_text(BUSMASTER.replace("SYSTEM MODE", "RELATIVE MODE"))
     with pytest.raises(InputError, match=r"a\.log:6: its head says RELATIVE MODE"):

@@ -17,6 +17,7 @@ from rds.core.errors import InputError
 
 _HEAD = 2048  # characters that are looked at
 _STANDARD = 0x7FF
+_DAY = 86400.0  # s
 _DATED = 1e8  # s: times beyond are of a clock, which may be set back; below they begin with the recording
 Parse = Callable[[str], can.Message | None]  # a line; None: it describes no frame. ValueError, IndexError: damaged
 
@@ -138,6 +139,7 @@ class _BusMaster:
 
     def __init__(self) -> None:
         self._base = 16
+        self._days, self._last = 0, 0.0  # that the log has lasted, and the time before
 
     def __call__(self, line: str) -> can.Message | None:
         if line.startswith("***"):
@@ -152,13 +154,15 @@ class _BusMaster:
             return None
         hours, minutes, seconds, parts = words[0].split(":")
         stamp = int(hours) * 3600.0 + int(minutes) * 60.0 + int(seconds) + int(parts) * 10.0 ** -len(parts)
+        self._days += stamp < self._last - _DAY / 2  # past midnight
+        self._last = stamp
         kind, size = words[4].lower(), int(words[5])
         if kind not in ("s", "x", "sr", "xr"):
             return None
         data = bytes(int(word, self._base) for word in words[6 : 6 + size])
         identifier = int(words[3], self._base)
         received, remote = words[1].lower() != "tx", kind.endswith("r")
-        return _message(stamp, identifier, kind[0] == "x", data, size, received, remote, words[2])
+        return _message(stamp + self._days * _DAY, identifier, kind[0] == "x", data, size, received, remote, words[2])
 
 
 class _Crtd:
