@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +73,17 @@ def test_a_path_may_name_whatever_a_text_may() -> None:
         rds.compare("a", "b")  # type: ignore[arg-type]
     part = rds.PartProgram(Path("part.ngc"), machine, interpolator=Path("steps.py"), controller=Path("law.py"))
     assert part.run().meta["program"]["completed"]
+
+
+def test_an_imported_module_is_the_file_that_it_was_imported_from(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(here)
+    module = importlib.import_module("law")
+    monkeypatch.delitem(sys.modules, "law")
+    plan = rds.Experiment(reference=rds.sinusoid(5.0, 2.0), controller=module, duration=0.5)
+    assert rds.compare(plan.run(), short().run()).identical
+    (here / "law.py").write_text(LAW.replace("control", "steer"))
+    with pytest.raises(rds.InputError, match="it defines none of"):
+        rds.Experiment(reference=rds.sinusoid(5.0, 2.0), controller=module).run()
 
 
 def test_the_folder_of_a_result_is_read_from_inside(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,7 +49,7 @@ class Experiment:
     """One or more axes of a machine, driven by controllers after references, or by voltage signals.
 
     The arguments are the keys of an experiment file (docs/experiments.md), with these liberties: `controller`
-    may be a library name, the path of a student's .py file (text or Path), a function
+    may be a library name, the path of a student's .py file (text or Path) or the module imported from it, a function
     `control(t, r, y, state, params)`, `globals()` of a notebook that defines one, a python-control system, an
     `rds.Controller`, or a table (dict); `model` likewise with `derivatives` or `advance`; `reference` and `signal` a
     signal (`rds.sinusoid(5.0, 0.2)`), a function of time, or a table. `axis` may be one name or several; with several,

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from rds.controllers import controller_names, library_controller
@@ -161,7 +162,9 @@ def _table_or_student(words: TomlTable, key: str, setting: Setting) -> tuple[Tom
     nameless = words.table_of(key, {})
     if isinstance(given, StudentFile):
         return nameless, given
-    if isinstance(given, os.PathLike):
+    if isinstance(given, ModuleType) and getattr(given, "__file__", None):
+        given = {"file": given.__file__}  # read anew, as each process of a run reads it
+    elif isinstance(given, os.PathLike):
         given = {"file": os.fspath(given)}
     elif isinstance(given, str):
         given = {"file" if given.endswith((".py", ".toml")) else "name": given}
