@@ -91,6 +91,10 @@ def asked(module: str, function: str, *arguments: Any) -> Callable[[], Any]:
 
 def _end() -> None:
     global _process
+    if _process is not None:
+        for stream in (_process.asked, _process.answers):
+            with suppress(OSError):  # somebody has closed its descriptor
+                stream.close()
     _process = None
 
 
