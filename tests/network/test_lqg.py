@@ -158,6 +158,15 @@ def test_the_smith_predictor_shifts_the_response(delay: float) -> None:
     assert smith["X_command"] == pytest.approx(plain["X_command"], abs=1e-9)
 
 
+@pytest.mark.parametrize("delay", [0.0, 0.0012, 0.006])
+def test_the_smith_predictors_poles_are_those_without_delay_and_the_axis_own(delay: float) -> None:
+    """Nothing in it only adds up: the loop would not be stable, and rounding would decide what a study says of it."""
+    plain, smith = (library_controller(name, MODEL, T, inf, **options) for name, options in (
+        ("pid", {}), ("smith", {"delay": delay, "law": "pid"})))  # fmt: skip
+    wanted = max(radius(AXIS, linear_law(plain), T, 0.0), np.exp(-T / TAU))
+    assert radius(AXIS, linear_law(smith), T, delay) == pytest.approx(wanted, rel=1e-6)
+
+
 def _pd(p: float, d: float) -> Law:
     return Law(np.zeros((1, 1)), np.array([[1.0]]), np.array([[d]]), -(p + d))
 
