@@ -41,15 +41,15 @@ _ROUNDING = 1e-9  # of a sample
 
 
 def control(t: float, r: Reference, y: float, state: Any, params: Mapping[str, Any]) -> tuple[float, Any]:
-    """Voltage (V) and next state: the inner law's; the model's velocity without and with delay; the voltages sent."""
-    inner, fast, slow, sent = state
+    """Voltage (V) and next state: the inner law's; how much faster the model without delay is; the voltages sent."""
+    inner, faster, sent = state
     (tau, K, T, left), first, rest, over = params["prediction"]
     whole = len(sent) - 1
-    ahead = K * (T * sum(sent[:whole]) + left * sent[whole]) - tau * (fast - slow)  # mm
+    ahead = K * (T * sum(sent[:whole]) + left * sent[whole]) - tau * faster  # mm
     u, inner = params["inner"](t, _later(r, params["delay"]), y + ahead, inner, params["inner_params"])
-    fast, sent = _pushed(fast, u, over), (u, *sent)
-    slow = _pushed(_pushed(slow, sent[whole + 1], first), sent[whole], rest)
-    return u, (inner, fast, slow, sent[:-1])
+    sent = (u, *sent)
+    late = _pushed(_pushed(0.0, sent[whole + 1], first), sent[whole], rest)
+    return u, (inner, _pushed(faster, u, over) - late, sent[:-1])
 
 
 def make(
@@ -81,7 +81,7 @@ def make(
         "inner_params": dict(inner.params),
         "prediction": ((axis.tau, axis.K, T, left), *parts),
     }
-    start = (inner.initial_state, 0.0, 0.0, (0.0,) * (whole + 1))
+    start = (inner.initial_state, 0.0, (0.0,) * (whole + 1))
     return Controller(control, start, params, Source(NAME), retune=NOT_LIVE)
 
 
