@@ -70,7 +70,7 @@ def test_the_linear_part_has_the_filter_that_has_settled() -> None:
     a12, a22, b1, b2 = design.over
     Phi, Gamma, seen = np.array([[1, a12], [0, a22]]), np.array([[b1], [b2]]), np.array([[1.0, 0.0]])
     q = np.array([[design.process[0], design.process[1]], [design.process[1], design.process[3]]])
-    L, _, filtered = control.dlqe(Phi, np.eye(2), seen, q, np.array([[design.noise]]))
+    L, _, _ = control.dlqe(Phi, np.eye(2), seen, q, np.array([[design.noise]]))
     wanted = (np.eye(2) - np.linalg.solve(Phi, L) @ seen) @ (Phi - Gamma @ np.array([design.gain]))
     found = linear_law(controller).F
     assert np.sort(np.abs(np.linalg.eigvals(found)))[-2:] == pytest.approx(np.sort(np.abs(np.linalg.eigvals(wanted))))
