@@ -130,8 +130,7 @@ def design_tracking(
     for `linear_axis_of`, and for poles too fast for the sampled loop.
     """
     axis = linear_axis_of(model)
-    given = [*poles] if hasattr(poles, "__iter__") else poles  # one number is refused where all others are
-    options: dict[str, Any] = {"poles": given, "observer_pole": observer_pole}
+    options: dict[str, Any] = {"poles": poles, "observer_pole": observer_pole}
     return tracking.make({"tau": axis.tau, "K": axis.K}, sample_period, voltage_range, **options)
 
 
@@ -146,7 +145,7 @@ def tracking_system(
     from rds.controllers.design import tracking_controller_system
 
     axis = linear_axis_of(model)
-    return tracking_controller_system(axis.tau, axis.K, [*poles], observer_pole, sample_period)
+    return tracking_controller_system(axis.tau, axis.K, poles, observer_pole, sample_period)
 
 
 def write_tracking(path: str | Path, model: Linear | ModelFile | Estimate | str | Path, **options: Any) -> Path:
