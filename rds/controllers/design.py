@@ -27,7 +27,8 @@ def read_poles(poles: Any, count: int | None = None, owner: str = "design") -> l
 
     Raises InputError unless there are `count` of them, finite, in conjugate pairs and left of the imaginary axis.
     """
-    if isinstance(poles, str | int | float | complex) or not hasattr(poles, "__iter__"):
+    is_number = isinstance(poles, np.ndarray) and not poles.ndim
+    if is_number or isinstance(poles, str) or not hasattr(poles, "__iter__"):
         raise InputError(f"{owner}: poles = {poles!r} must be a list, such as [[-32, 24], [-32, -24]] (1/s)")
     read = [_pole(pole, owner) for pole in poles]
     if count is not None and len(read) != count:
@@ -46,7 +47,7 @@ def _order(pole: complex) -> tuple[float, float]:
 
 def _pole(pole: Any, owner: str) -> complex:
     part = Quantity("part of a pole", "1/s")
-    if isinstance(pole, list | tuple):
+    if isinstance(pole, list | tuple) or (isinstance(pole, np.ndarray) and pole.ndim):
         if len(pole) != 2:
             raise InputError(f"{owner}: the pole {pole!r} must be [real, imaginary], 1/s")
         return complex(part.check(pole[0], "real part", owner), part.check(pole[1], "imaginary part", owner))

@@ -2,6 +2,7 @@
 
     u = bias + Pgain (b r - y) + Igain ∫(r - y) + Dgain d/dt (c r - y)_f
 
+with r and y counted from where the axis stands at the first sample, so that it starts without a jump anywhere.
 A step of the reference then reaches the axis through the integral, and only a share b of it through Pgain, so that
 it overshoots less, and with c = 0 it gives no derivative kick. The price is a following error of
 (1 - b) Pgain/Igain per mm/s of reference. Integral, derivative filter and anti-windup are discretized as in
@@ -43,13 +44,15 @@ OPTIONS = GAINS | WEIGHTS | BIAS | {"maxerrorI": ERROR_LIMITS["maxerrorI"]} | OU
 def law(position, velocity, acceleration, y, state, c):
     """Voltage (V) and next state, for a reference (mm, mm/s, mm/s²) and the measured position `y` (mm).
 
-    State: integral of the error (mm s), filtered derivative of c r - y (mm/s), the last c r - y (mm), and 0.0 before
-    the first sample, 1.0 after it.
+    State: integral of the error (mm s), filtered derivative of c r - y (mm/s), the last c r - y (mm), the `y` of the
+    first sample (mm), and 0.0 before the first sample, 1.0 after it.
     """
-    integral, derivative, last, started = state
+    integral, derivative, last, origin, started = state
     T, q, slope, P, I, D, b, weight, bias, maxerrorI, limit = c  # noqa: E741
+    if started == 0.0:
+        origin = y
     e = position - y
-    weighted = weight * position - y
+    weighted = e - (1.0 - weight) * (position - origin)
     summed = integral + e * T
     if summed > maxerrorI:
         summed = maxerrorI
@@ -57,7 +60,7 @@ def law(position, velocity, acceleration, y, state, c):
         summed = -maxerrorI
     if started != 0.0:  # there is no slope before the second sample
         derivative = q * derivative + slope * (weighted - last)
-    u = bias + P * (b * position - y) + I * summed + D * derivative
+    u = bias + P * (e - (1.0 - b) * (position - origin)) + I * summed + D * derivative
     if u > limit:
         u = limit
         if e > 0.0:
@@ -66,7 +69,7 @@ def law(position, velocity, acceleration, y, state, c):
         u = -limit
         if e < 0.0:
             summed = integral
-    return u, (summed, derivative, weighted, 1.0)
+    return u, (summed, derivative, weighted, origin, 1.0)
 
 
 def control(t: float, r: Reference, y: float, state: Any, params: Mapping[str, Any]) -> tuple[float, Any]:
@@ -106,7 +109,7 @@ def make(
     )
     retune = partial(retuned, make, dict(axis_model), T, converter_range, unit)
     params = gains | {"coefficients": coefficients}
-    start, signals = (0.0, 0.0, 0.0, 0.0), {"integral": integral_unit(unit)}
+    start, signals = (0.0, 0.0, 0.0, 0.0, 0.0), {"integral": integral_unit(unit)}
     return Controller(
         control, start, params, Source(NAME), tunable=OPTIONS, retune=retune, signals=signals, observe=observe
     )

@@ -3,8 +3,9 @@
     ŷ = y + x̂(t) - x̂(t - delay)        (O. J. M. Smith, Chem. Eng. Prog. 53 (1957) 217-219)
 
 with x̂ the model's position on the voltages that were sent. For an axis, which integrates, the difference of both is
-the distance that the voltages on their way will move it; the inner law gets ŷ, and sees an axis without delay. It gets
-the reference of the instant at which its voltage will act, too. A constant disturbance leaves an error even under an
+the distance that the voltages on their way will move it, K ∫u - τ Δv̂ over the delay: nothing is summed up that rounding
+would drive away. The inner law gets ŷ, and sees an axis without delay. It gets the reference of the instant at which
+its voltage will act, too. A constant disturbance leaves an error even under an
 inner law with an integral: use `lqg` where that matters.
 """
 
@@ -40,18 +41,15 @@ _ROUNDING = 1e-9  # of a sample
 
 
 def control(t: float, r: Reference, y: float, state: Any, params: Mapping[str, Any]) -> tuple[float, Any]:
-    """Voltage (V) and next state: the inner law's; the model's velocity with and without delay; the voltages sent.
-
-    The state's second part is the distance that the voltages on their way move the axis, mm.
-    """
-    inner, ahead, fast, slow, sent = state
+    """Voltage (V) and next state: the inner law's; how much faster the model without delay is; the voltages sent."""
+    inner, faster, sent = state
+    (tau, K, T, left), first, rest, over = params["prediction"]
+    whole = len(sent) - 1
+    ahead = K * (T * sum(sent[:whole]) + left * sent[whole]) - tau * faster  # mm
     u, inner = params["inner"](t, _later(r, params["delay"]), y + ahead, inner, params["inner_params"])
-    whole, first, rest, over = params["prediction"]
-    x, fast = _moved(0.0, fast, u, over)
     sent = (u, *sent)
-    late, slow = _moved(0.0, slow, sent[whole + 1], first)
-    late, slow = _moved(late, slow, sent[whole], rest)
-    return u, (inner, ahead + x - late, fast, slow, sent[:-1])
+    late = _pushed(_pushed(0.0, sent[whole + 1], first), sent[whole], rest)
+    return u, (inner, _pushed(faster, u, over) - late, sent[:-1])
 
 
 def make(
@@ -81,9 +79,9 @@ def make(
         "law": values["law"],
         "inner": inner.control,
         "inner_params": dict(inner.params),
-        "prediction": (whole, *parts),
+        "prediction": ((axis.tau, axis.K, T, left), *parts),
     }
-    start = (inner.initial_state, 0.0, 0.0, 0.0, (0.0,) * (whole + 1))
+    start = (inner.initial_state, 0.0, (0.0,) * (whole + 1))
     return Controller(control, start, params, Source(NAME), retune=NOT_LIVE)
 
 
@@ -92,6 +90,6 @@ def _later(r: Reference, time: float) -> Reference:
     return Reference(r[0] + r[1] * time + 0.5 * r[2] * time * time, r[1] + r[2] * time, r[2])
 
 
-def _moved(x: float, v: float, u: float, over: tuple[float, float, float, float]) -> tuple[float, float]:
-    a12, a22, b1, b2 = over
-    return x + a12 * v + b1 * u, a22 * v + b2 * u
+def _pushed(v: float, u: float, over: tuple[float, float, float, float]) -> float:
+    """The model's velocity after a time of constant voltage."""
+    return over[1] * v + over[3] * u

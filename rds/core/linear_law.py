@@ -14,6 +14,8 @@ from rds.core.values import own_copy
 
 _STEP = 1e-4  # mm of the position, and of each number of the state
 _IN_PROPORTION = 1e-6
+_SAMPLES_AT_REST = 2000  # at most, until the state stays: as that of a Kalman filter, whose gain settles
+_SETTLED = 1e-9  # of each of its numbers
 _REST = Reference(0.0, 0.0, 0.0)
 
 
@@ -42,9 +44,13 @@ def linear_law(controller: Controller) -> Law:
     if controller.coupled:
         raise InputError(f"controller {name!r} drives several axes at once; the analysis is of one axis")
     state = own_copy(controller.initial_state, "initial_state", controller.source.path)
-    for _ in range(3):  # what a law does at its first sample only is behind it
-        _, state = _answer(controller, 0.0, state)
     shape, rest = _flat(state, name)
+    for _ in range(_SAMPLES_AT_REST):  # what a law does at its first samples only is behind it
+        before = rest
+        _, state = _answer(controller, 0.0, state)
+        shape, rest = _flat(state, name)
+        if len(rest) == len(before) and all(map(_same, rest, before)):
+            break
     u0, after = _answer(controller, 0.0, state)
     base = np.array([u0, *_flat(after, name)[1]])
 
@@ -53,7 +59,8 @@ def linear_law(controller: Controller) -> Law:
         if index is not None:
             numbers[index] += size
         u, following = _answer(controller, size if index is None else 0.0, _shaped(shape, numbers))
-        slope: np.ndarray = (np.array([u, *_flat(following, name)[1]]) - base) / size
+        with np.errstate(invalid="ignore"):  # of numbers that are infinite at rest
+            slope: np.ndarray = (np.array([u, *_flat(following, name)[1]]) - base) / size
         return slope
 
     n = len(rest)
@@ -71,6 +78,10 @@ def linear_law(controller: Controller) -> Law:
         reached |= further
         left += further
     return _minimal(F, G, H, D, sorted(int(index) for index in reached))
+
+
+def _same(a: float, b: float) -> bool:
+    return a == b or abs(a - b) <= _SETTLED * abs(b)
 
 
 def _in_proportion(change: Callable[[float, int | None], np.ndarray], index: int | None, name: str) -> np.ndarray:

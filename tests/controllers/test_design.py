@@ -63,6 +63,7 @@ def test_gains_place_the_poles(tau, slow, fast):
 
 
 def test_a_double_pole_can_be_placed():
+    assert tracking_gains(0.01, np.array([[-40, 0], [-40, 0]])) == pytest.approx((1600, -20))
     assert tracking_gains(0.01, [-40, -40]) == pytest.approx((1600, -20))
 
 
@@ -75,6 +76,7 @@ def test_a_double_pole_can_be_placed():
         ([float("nan"), -1], "finite"),
         (["fast", -1], "number"),
         (-32, "must be a list"),
+        (np.array(-32.0), "must be a list"),
         ([[-32, 24, 1], [-32, -24]], "[real, imaginary]"),
     ],
 )

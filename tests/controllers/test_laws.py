@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -92,8 +93,6 @@ def test_anti_windup_keeps_a_long_saturated_move_from_overshooting(name):
 
 def _saturated(model):
     """The axis behind a converter that the controller does not know of."""
-    from dataclasses import replace
-
     inner = model.motion
 
     def start(model, T):
@@ -177,6 +176,18 @@ def test_a_step_gives_no_derivative_kick_under_the_modified_pid():
     _, state = controller.control(0.0, Reference(0.0, 0.0, 0.0), 0.0, state, params)
     u, _ = controller.control(T, Reference(0.1, 0.0, 0.0), 0.0, state, params)
     assert u == pytest.approx(0.1 * (params["Pgain"] * params["b"] + params["Igain"] * T))
+
+
+@pytest.mark.parametrize("name", controller_names())
+def test_a_law_starts_wherever_the_axis_stands(name):
+    """Where 0 is on an axis changes no voltage."""
+    t = np.arange(400) * T
+    about = Reference(0.5 * np.sin(6.0 * t), 3.0 * np.cos(6.0 * t), -18.0 * np.sin(6.0 * t))
+    voltages = []
+    for place in (0.0, 64.0):
+        model = replace(plant("X"), initial_state=[place, 0.0])
+        voltages.append(run(make(name), model, about._replace(position=place + about.position))[1])
+    np.testing.assert_allclose(*voltages, rtol=0, atol=1e-9)
 
 
 numbers = floats(-1e3, 1e3)

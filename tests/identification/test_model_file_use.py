@@ -13,6 +13,7 @@ import rds
 from rds.checks import check_file
 from rds.cli.main import app
 from rds.core.errors import InputError
+from rds.core.load import load_student
 from rds.identification.fit.design import (
     design_tracking,
     linear_axis_of,
@@ -57,6 +58,13 @@ def test_periods_poles_and_limits_are_taken(tmp_path: Path) -> None:
     assert made.params["g1"] == pytest.approx(2000.0) and made.params["coefficients"][-1] == 5.0
     text = write_tracking(tmp_path / "own.py", model, sample_period=0.002, voltage_range=5.0).read_text()
     assert "sampled every 0.002 s" in text and '"limit": 5.0' in text
+
+
+@pytest.mark.parametrize("limit", [np.inf, np.float64(5.0)])
+def test_the_file_is_python_whatever_numbers_it_was_made_with(tmp_path: Path, limit: float) -> None:
+    axis = linear_axis_of_machine(load_machine("mini-cnc"), "X")
+    own = write_tracking(tmp_path / "own.py", axis, sample_period=np.float64(0.002), voltage_range=limit)
+    assert load_student(own).controller().params["limit"] == limit
 
 
 def test_a_law_for_an_axis_that_turns_is_in_degrees(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -129,8 +130,7 @@ def design_tracking(
     for `linear_axis_of`, and for poles too fast for the sampled loop.
     """
     axis = linear_axis_of(model)
-    given = [*poles] if hasattr(poles, "__iter__") else poles  # one number is refused where all others are
-    options: dict[str, Any] = {"poles": given, "observer_pole": observer_pole}
+    options: dict[str, Any] = {"poles": poles, "observer_pole": observer_pole}
     return tracking.make({"tau": axis.tau, "K": axis.K}, sample_period, voltage_range, **options)
 
 
@@ -145,7 +145,7 @@ def tracking_system(
     from rds.controllers.design import tracking_controller_system
 
     axis = linear_axis_of(model)
-    return tracking_controller_system(axis.tau, axis.K, [*poles], observer_pole, sample_period)
+    return tracking_controller_system(axis.tau, axis.K, poles, observer_pole, sample_period)
 
 
 def write_tracking(path: str | Path, model: Linear | ModelFile | Estimate | str | Path, **options: Any) -> Path:
@@ -156,7 +156,8 @@ def write_tracking(path: str | Path, model: Linear | ModelFile | Estimate | str 
     keep_another(path, "Tracking control designed for", "designed controller")
     axis = linear_axis_of(model)
     made = design_tracking(model, **options)
-    period, limit = options.get("sample_period", 0.001), options.get("voltage_range", 10.0)
+    period, limit = float(options.get("sample_period", 0.001)), float(options.get("voltage_range", 10.0))
+    said_limit = f"{limit!r}" if isfinite(limit) else 'float("inf")'
     g1, g2, L, F, G, H = (made.params[name] for name in ("g1", "g2", "L", "F", "G", "H"))
     inverse_gain, inertia = made.params["coefficients"][:2]
     left_out = "".join(f"- {sentence}\n" for sentence in axis.left_out)
@@ -184,7 +185,7 @@ params = {{
     "F": {F!r},
     "G": {G!r},  # 1/s
     "H": {H!r},  # (mm/s)/V
-    "limit": {limit!r},  # V
+    "limit": {said_limit},  # V
 }}
 
 initial_state = [0.0, 0.0]  # the observer's state (mm/s); 1 after the first sample
