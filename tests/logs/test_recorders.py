@@ -4,6 +4,7 @@ that is read.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -132,10 +133,11 @@ HALSCOPE = (
     "Sampling period is 1000000 nSec \n\n"
     + "".join(f"joint.0.pos-fb {X[k]:+.14f} pid.x.output {U[k]:+.14f} (null) +0.0 \n" for k in range(400)),
 )
+COMMAS = tuple(re.sub(r"(?<=\d)\.(?=\d{14})", ",", text) for text in HALSCOPE)  # as on a desktop in Russian
 
 
 @pytest.mark.parametrize("name", ["halscope.log", "halscope.csv", "halscope.txt"])
-@pytest.mark.parametrize("text", HALSCOPE)
+@pytest.mark.parametrize("text", HALSCOPE + COMMAS)
 def test_logs_of_halscope_are_columns_with_a_time(text: str, name: str, tmp_path: Path) -> None:
     path = saved(tmp_path / name, text)
     assert list(read_table(path).columns) == ["time", "joint.0.pos-fb", "pid.x.output"]
