@@ -23,7 +23,9 @@ MEASUREMENTS = (".mf4", ".mdf", ".dat")  # of which some are text, and some bus 
 _EXPORTS = {
     ".toml": "a model, a map or an experiment, and no log: `rds validate` takes the model first, then logs",
     ".tdms": "NI's TDMS: in LabVIEW write the channels by `Write To Measurement File` as text (LVM); or in Python "
-    "`nptdms.TdmsFile.read(FILE).as_dataframe(time_index=True).to_csv('log.csv', index_label='time [s]')`",
+    "`nptdms.TdmsFile.read(FILE).as_dataframe(time_index=True).to_csv('log.csv', index_label='time [s]')`; where "
+    "that says that no time properties are available, `as_dataframe().to_csv('log.csv', index=False)`, and the rate of "
+    "the samples in a map",
     **dict.fromkeys(
         (".xlsx", ".xls", ".ods"),
         "a spreadsheet: save the sheet with the samples as CSV (UTF-8), with the units in its headings (`pos [mm]`)",
