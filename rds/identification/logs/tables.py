@@ -47,7 +47,8 @@ _EXPORTS = {
     ),
     **dict.fromkeys(
         (".bag", ".db3", ".mcap"),
-        "a recording of ROS: export the topic as CSV, as PlotJuggler does, or `ros2 topic echo`",
+        "a recording of ROS: export the topics as CSV, as PlotJuggler does (of several topics, a map says "
+        'blanks = "hold"), or `ros2 topic echo`',
     ),
     ".json": "JSON: save the signals as columns of CSV, in Python by "
     "`pandas.DataFrame({'t [s]': ..., 'u [V]': ..., 'y [mm]': ...}).to_csv('log.csv', index=False)`",
