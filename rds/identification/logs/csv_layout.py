@@ -269,7 +269,7 @@ def _passed(above: Sequence[str], delimiter: str, decimal: str, width: int, numb
         cells = split(line, delimiter)
         if len(cells) == width and len(numbers) > 1 and all(is_number(cells[i], decimal) for i in numbers):
             return line
-        if are_numbers([cell for cell in cells if cell]):
+        if are_numbers([cell for cell in cells if cell]) or are_numbers(line.split()):
             return line  # perhaps the first row, with a constant beside it
     return ""
 
