@@ -343,7 +343,8 @@ def _below_labels(lines: Sequence[str], first: int, delimiter: str, decimal: str
 
 def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
     """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
-    above = [line for line in lines[:first] if line.strip()][-2:]
+    noted = [_note(line, delimiter, width) for line in lines[:first]]
+    above = [line for line, note in zip(lines, noted, strict=False) if line.strip() and note is None][-2:]
     below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
     ended = bool(below) and all(cells[-1] == "" for cells in below)  # a delimiter ends each row, and perhaps no heading
     rows = [_heading_cells(line + delimiter * ended, delimiter, width) for line in above]
@@ -369,8 +370,20 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
         if unit and units[i] and dimension(unit) and dimension(units[i] or "") and plain(unit) != plain(units[i] or ""):
             torn.append(f"{name} in {unit}, and {units[i]} below")
         units[i] = unit if unit is not None else units[i]
+    for note in noted:
+        if note is not None and note[0] in _UNIT_LABELS:
+            units = [unit or own or None for unit, own in zip(units, ["", *note[1]], strict=True)]
     of_labview = labview_units(lines[:first], lambda line: split(line, delimiter), names)
     return Headings(tuple(names), of_labview or tuple(units), torn=tuple(torn))
+
+
+def _note(line: str, delimiter: str, width: int) -> tuple[str, list[str]] | None:
+    """What a row below the headings notes of each signal, as Simulink's data inspector does: `,Units: mm,Units: V`."""
+    label, *cells = split(line, delimiter) or [""]
+    keys = {cell.partition(":")[0].strip().casefold() for cell in cells}
+    if label or width < 2 or len(cells) != width - 1 or len(keys) != 1 or not all(":" in cell for cell in cells):
+        return None
+    return keys.pop(), [cell.partition(":")[2].strip() for cell in cells]
 
 
 def _heading_cells(line: str, delimiter: str, width: int) -> list[str] | None:
