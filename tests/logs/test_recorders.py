@@ -158,6 +158,15 @@ def test_a_cut_line_of_halscope_is_named(text: str, line: int, tmp_path: Path) -
         read_table(saved(tmp_path / "halscope.log", text))
 
 
+def test_a_trend_of_studio_5000_is_refused_with_how_to_put_points_into_its_times(tmp_path: Path) -> None:
+    head = "Trend Name: ,Axis\nSample Period: ,1 ms\nStart Time: ,27/11/2026 12:00:00;000\nHeader: ,Date,Time,Pos,Trq\n"
+    text = head + "".join(f"Data: ,27/11/2026,12:00:00;{k:03d},{k}.5,2.5\n" for k in range(40))
+    with pytest.raises(InputError, match=r"Studio 5000.* `sed -E 's/.*/\\1\.\\2,/' FILE"):
+        read_table(saved(tmp_path / "trend.csv", text))
+    table = read_table(saved(tmp_path / "log.csv", re.sub(r"(:\d\d);(\d+),", r"\1.\2,", text)))
+    assert np.allclose(table.columns["Time"].values, np.arange(40) / 1e3) and table.columns["Trq"].values[0] == 2.5
+
+
 def test_a_log_of_halscope_without_samples_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no samples are in it"):
         read_table(saved(tmp_path / "halscope.log", "Sampling period is 1000000 nSec \n\n"))

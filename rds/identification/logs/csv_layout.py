@@ -42,6 +42,7 @@ _FEW = 20  # rows of data that are looked at for how they end
 HEAD = 1 << 16  # bytes looked at
 _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
 _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
+_TREND = re.compile(r"\d\d:\d\d:\d\d;\d{1,6},")  # a time in a trend of Rockwell's Studio 5000
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
 
 
@@ -85,6 +86,10 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
                 best = (score, width, mark, point, first)
     if (beside := _of_tektronix(lines, encoding)) is not None:
         return beside
+    if any(line.startswith("Header:") for line in lines) and any(_TREND.search(line) for line in lines):
+        what = "it is a trend of Studio 5000, whose times have a semicolon before the fraction"
+        cure = "sed -E 's/(:[0-9]{2});([0-9]+),/\\1.\\2,/' FILE > log.csv"
+        raise InputError(f"{what}; put points there: `{cure}`", str(path))
     if best is None:
         shown = next((line for line in lines if line.strip()), "")
         remedy = "it needs columns of numbers, separated by commas, semicolons, tabs, bars or spaces"
