@@ -158,6 +158,11 @@ def test_a_cut_line_of_halscope_is_named(text: str, line: int, tmp_path: Path) -
         read_table(saved(tmp_path / "halscope.log", text))
 
 
+def test_tdms_is_refused_with_the_export_of_channels_that_have_no_times(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no time properties .*`as_dataframe\(\)\.to_csv\('log\.csv', index=False\)`"):
+        read_table(saved(tmp_path / "a.tdms", "TDSm"))
+
+
 def test_a_trend_of_studio_5000_is_refused_with_how_to_put_points_into_its_times(tmp_path: Path) -> None:
     head = "Trend Name: ,Axis\nSample Period: ,1 ms\nStart Time: ,27/11/2026 12:00:00;000\nHeader: ,Date,Time,Pos,Trq\n"
     text = head + "".join(f"Data: ,27/11/2026,12:00:00;{k:03d},{k}.5,2.5\n" for k in range(40))
