@@ -17,6 +17,7 @@ from rds.identification.fit.model_file import read_model, write_model
 from rds.identification.fit.run_model import run_model
 from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import Log
+from rds.identification.structures import axis_inertia
 from rds.identification.structures.structures import structure
 from rds.identification.validate.candidate import as_candidate
 from rds.identification.validate.cross_test import cross_test
@@ -320,3 +321,15 @@ def test_inverse_dynamics_of_a_held_torque_is_not_biased() -> None:
     for name, value in TURNS.items():
         error = abs(found[name].value - value)
         assert error < max(4.0 * found[name].std_error, 1e-3 * value), (name, found[name])
+
+
+def test_the_inertia_of_a_small_motor_is_no_bound() -> None:
+    """2 g·cm² and less, as motors of a few watts have, are far below a millionth of a kg·m²."""
+    truth = {"J": 2e-8, "B": 4e-8, "T_c": 4e-7, "offset": 0.0, "torque_gain": 1.0}
+    t = np.arange(800) * 0.004
+    u = 3e-6 * np.sign(np.sin(6.0 * t)) * (1.0 + 0.4 * np.sin(2.3 * t))
+    small = axis_inertia.make((), "rev/min", "Nm")
+    y = small.respond(t, u, (0.0,), truth) + 0.2 * np.random.default_rng(0).standard_normal(len(t))
+    found = fit([Log("motor", t, u, y, units={"command": "Nm", "position": "rev/min"})], small, "simulation")
+    assert all(found.parameters[name].value == pytest.approx(truth[name], rel=0.02) for name in ("J", "B", "T_c"))
+    assert not any("bound" in warning for warning in found.warnings)

@@ -196,6 +196,17 @@ def test_a_log_sampled_too_slowly_gives_no_model_and_says_which_period_would_do(
     assert "in seconds" not in " ".join(found.warnings)
 
 
+def test_a_lag_that_is_tau_or_delay_is_no_want_of_samples() -> None:
+    """Under a triangle, time constant and delay make the same motion: faster samples would not tell them apart."""
+    t = np.arange(500) * 0.004
+    u = 8.0 / np.pi * np.arcsin(np.sin(0.8 * np.pi * t))
+    truth = {"tau": 0.001, "K": 20.0, "friction_plus": 5.0, "friction_minus": -5.0, "delay": 0.069}
+    y = make(("delay",)).respond(t, u, (0.0, 0.0), truth) + 0.1 * np.random.default_rng(1).standard_normal(len(t))
+    found = fit([Log("triangle", t, u, y, resolution=0.01)], make(("delay",)))
+    said = " ".join(found.unusable())
+    assert "the sum of tau and delay, 70.1 ms, and neither of them" in said and "sampled too slowly" not in said
+
+
 def test_logs_of_different_axes_contradict_each_other() -> None:
     logs = [axis_log(X, seed=1, seconds=4.0), axis_log(X, seed=2, seconds=4.0)]
     assert not any("contradict" in warning for warning in fit(logs, make()).warnings)

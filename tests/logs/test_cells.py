@@ -107,6 +107,29 @@ def test_what_a_recorder_writes_beyond_its_range_is_a_blank_that_a_map_can_drop(
     assert len(read_log(path)[0]) == 399
 
 
+def test_rows_of_one_message_each_hold_the_last_values_beside_a_position(tmp_path: Path) -> None:
+    """As PlotJuggler writes a recording of ROS: no row has a command and a position."""
+    path = tmp_path / "log.csv"
+    rows = [f"{0.002 * k:.3f},,{k % 7}" for k in range(60)]
+    rows[10::10] = [f"{row}\n{row.partition(',')[0]},{k},".replace(" ", "") for k, row in enumerate(rows[10::10], 1)]
+    path.write_text("t,u,x\n" + "\n".join(rows) + "\n")
+    text = '[time]\ncolumn = "t"\nunit = "s"\n[axis.X]\ncommand = { column = "u", unit = "V" }\n'
+    text += 'position = { column = "x", unit = "mm" }\n'
+    where = tmp_path / "log.csv.map.toml"
+    for blanks in ("refuse", "drop"):
+        where.write_text(f'blanks = "{blanks}"\n{text}')
+        with pytest.raises(InputError, match='blanks = "hold" in the map holds the last values'):
+            read_log(path)
+    where.write_text(f'blanks = "hold"\n{text}')
+    (log,) = read_log(path)
+    assert log.time[0] == 0.022 and np.array_equal(log.position, np.arange(11, 60) % 7)
+    assert np.array_equal(log.command, np.arange(10, 59) // 10)
+    said = " ".join(finding.what for finding in log.findings)
+    assert (
+        "11 samples before the first command were left out" in said and "5 rows above" in said and "10 at most" in said
+    )
+
+
 def test_decimal_commas_between_commas_are_told(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     rows = (f"{t:.3f},{u:.1f},{x:.3f}".replace(".", "!") for t, u, x in zip(*axis(50).values(), strict=True))

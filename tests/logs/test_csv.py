@@ -208,6 +208,14 @@ def test_half_a_file_loses_its_cut_line_and_says_so(tmp_path: Path) -> None:
     assert len(log) == whole[: len(whole) // 2].count(b"\n") - 1
 
 
+@pytest.mark.parametrize("tail", ["\t\t\n", "\n  \n\t\n", "\r\n\t", "\t\t\n" * 9999])
+def test_lines_of_blanks_at_the_end_are_no_rows(tmp_path: Path, tail: str) -> None:
+    path = tmp_path / "log.dat"
+    path.write_bytes(("t [s]\tu [V]\tx [mm]\tv\n" + "0.5\t1\t2\t\n" * 3 + tail).encode())
+    table = read_csv(path)
+    assert len(table.columns["x"].values) == 3 and not table.findings
+
+
 @pytest.mark.parametrize("heading", ["# samples: 8000", "# 1 kHz, samples = 8000"])
 def test_fewer_samples_than_announced(tmp_path: Path, heading: str) -> None:
     path = write(tmp_path / "log.csv", headed(axis()))

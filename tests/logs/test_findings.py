@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.identification.logs import sampling
+from rds.identification.logs.describe import describe
 from rds.identification.logs.log import Finding, Gravity, Log
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.steps import step_of
@@ -374,3 +375,12 @@ def test_levels_that_are_each_held_are_no_limit(tmp_path: Path) -> None:
     assert "saturation" not in grave(read(tmp_path, columns | {"voltage": ramp}))
     clipped = np.clip(held, -4.0, 4.0)
     assert "limited?" in grave(read(tmp_path, columns | {"voltage": clipped}))["saturation"].what
+
+
+def test_what_some_stretches_have_is_said_of_these(tmp_path: Path) -> None:
+    columns = axis(2000)
+    columns["time"] = columns["time"] + 0.01 * sum(columns["time"] >= gap for gap in (0.2195, 0.2795, 0.7195, 0.7795))
+    path = write(tmp_path / "log.csv", headed(columns))
+    (tmp_path / "log.csv.map.toml").write_text('gaps = "split"\n' + MAP)
+    said = [finding.what for finding in describe(path).findings if "only 60 samples" in finding.what]
+    assert len(said) == 1 and said[0].startswith("log part 2, log part 4: it has only 60 samples")

@@ -215,6 +215,20 @@ def test_rows_that_are_taken_for_the_head_are_told(tmp_path: Path) -> None:
     assert kept == 400 or told
 
 
+def test_rows_that_note_something_of_each_signal_are_no_headings(tmp_path: Path) -> None:
+    """As Simulink's data inspector saves them."""
+    head = "time,Axis:1,cmd\n,Type: double,Type: double\n,Units: mm,Units: V\n,Interp: linear,Interp: zoh\n"
+    (tmp_path / "a.csv").write_text(head + "0.1,2,3\n0.2,3,4\n" * 3)
+    columns = read_table(tmp_path / "a.csv").columns
+    assert {name: column.unit for name, column in columns.items()} == {"time": None, "Axis:1": "mm", "cmd": "V"}
+
+
+def test_a_first_row_with_another_separator_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("0.0e+000 1.2e+000\t\n" + "".join(f"{k}.0e-001\t1.2e+000\t\n" for k in range(1, 9)))
+    (told,) = [f.what for f in read_table(tmp_path / "a.txt").findings if f.kind == "headings"]
+    assert "was passed over: '0.0e+000 1.2e+000" in told
+
+
 def test_a_preamble_with_numbers_is_no_lost_row(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("Attenuation,10,10\nt [s],u [V],x [mm]\n" + "0.1,2,3\n0.2,3,4\n" * 3)
     assert not read_table(tmp_path / "a.csv").findings

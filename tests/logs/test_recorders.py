@@ -4,6 +4,7 @@ that is read.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -132,10 +133,11 @@ HALSCOPE = (
     "Sampling period is 1000000 nSec \n\n"
     + "".join(f"joint.0.pos-fb {X[k]:+.14f} pid.x.output {U[k]:+.14f} (null) +0.0 \n" for k in range(400)),
 )
+COMMAS = tuple(re.sub(r"(?<=\d)\.(?=\d{14})", ",", text) for text in HALSCOPE)  # as on a desktop in Russian
 
 
 @pytest.mark.parametrize("name", ["halscope.log", "halscope.csv", "halscope.txt"])
-@pytest.mark.parametrize("text", HALSCOPE)
+@pytest.mark.parametrize("text", HALSCOPE + COMMAS)
 def test_logs_of_halscope_are_columns_with_a_time(text: str, name: str, tmp_path: Path) -> None:
     path = saved(tmp_path / name, text)
     assert list(read_table(path).columns) == ["time", "joint.0.pos-fb", "pid.x.output"]
@@ -154,6 +156,20 @@ def test_logs_of_halscope_are_columns_with_a_time(text: str, name: str, tmp_path
 def test_a_cut_line_of_halscope_is_named(text: str, line: int, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=f"line {line}: .* one number for each of the [23] pins"):
         read_table(saved(tmp_path / "halscope.log", text))
+
+
+def test_tdms_is_refused_with_the_export_of_channels_that_have_no_times(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no time properties .*`as_dataframe\(\)\.to_csv\('log\.csv', index=False\)`"):
+        read_table(saved(tmp_path / "a.tdms", "TDSm"))
+
+
+def test_a_trend_of_studio_5000_is_refused_with_how_to_put_points_into_its_times(tmp_path: Path) -> None:
+    head = "Trend Name: ,Axis\nSample Period: ,1 ms\nStart Time: ,27/11/2026 12:00:00;000\nHeader: ,Date,Time,Pos,Trq\n"
+    text = head + "".join(f"Data: ,27/11/2026,12:00:00;{k:03d},{k}.5,2.5\n" for k in range(40))
+    with pytest.raises(InputError, match=r"Studio 5000.* `sed -E 's/.*/\\1\.\\2,/' FILE"):
+        read_table(saved(tmp_path / "trend.csv", text))
+    table = read_table(saved(tmp_path / "log.csv", re.sub(r"(:\d\d);(\d+),", r"\1.\2,", text)))
+    assert np.allclose(table.columns["Time"].values, np.arange(40) / 1e3) and table.columns["Trq"].values[0] == 2.5
 
 
 def test_a_log_of_halscope_without_samples_is_refused(tmp_path: Path) -> None:

@@ -30,6 +30,7 @@ _PERIODS = 2.0  # of the sample period: a time constant that is shorter is sampl
 _TOLD_BY = 0.6  # of the sample period: below it nothing is told
 _ROUND = 0.2  # of the time constant: a sample period that would do
 _UNTOLD = 0.5  # standard error over value from which a parameter that cannot be zero is not told
+_SUM = -0.9  # correlation of two parameters from which their sum is told, and neither of them
 
 
 def made_estimate(
@@ -74,7 +75,7 @@ def made_estimate(
     notes += dict.fromkeys(f.what for log in logs for f in log.findings if f.kind == UNKNOWN)
     begun, free_run, predictions = {}, {}, {}
     said = _of_logs(logs)
-    said += [*said_of_guesses(parameters), *_too_slow(logs, parameters, method), *warnings]
+    said += [*said_of_guesses(parameters), *_too_slow(logs, parameters, covariance, method), *warnings]
     if _none_told(parameters) and not any(UNUSABLE in sentence for sentence in said):
         said.append(
             f"{UNUSABLE}: not one of them is told by these data (every interval is wider than its value, or has no "
@@ -132,8 +133,11 @@ def _of_logs(logs: Sequence[Log]) -> list[str]:
     return said + [f"{names_of(names)}: {what}" for what, names in warned.items()]
 
 
-def _too_slow(logs: Sequence[Log], parameters: Mapping[str, Parameter], method: str) -> list[str]:
-    """A sentence where the samples are too far apart for the time constant, with the period that would do.
+def _too_slow(
+    logs: Sequence[Log], parameters: Mapping[str, Parameter], covariance: np.ndarray, method: str
+) -> list[str]:
+    """A sentence where the samples are too far apart for the time constant, with the period that would do; or where a
+    delay makes up for it.
 
     Not of inverse dynamics: derivatives of coarse or noisy positions make its time constants short, whatever they are.
     """
@@ -150,6 +154,15 @@ def _too_slow(logs: Sequence[Log], parameters: Mapping[str, Parameter], method: 
             f"{1e3 * made.value:.3g} ms; {1e3 * enough:.2g} ms would do"
         ]
     most = _TOLD_BY * period
+    delay = parameters.get("delay")
+    if delay is not None and delay.std_error > 0.0 and not made.high <= most:
+        i, j = (list(parameters).index(name) for name in ("tau", "delay"))
+        if not covariance[i, j] > _SUM * made.std_error * delay.std_error:
+            return [
+                f"{UNUSABLE}: these data tell the sum of tau and delay, {1e3 * (made.value + delay.value):.3g} ms, and "
+                "neither of them: a command that changes slowly makes the same motion with either. Log steps of the "
+                "command, or hold one of them (--fix delay=0)"
+            ]
     return [
         f"{UNUSABLE}: sampled too slowly. Within a sample period of {1e3 * period:.3g} ms the axis is at its speed: "
         f"the log tells that tau is below {1e3 * most:.3g} ms, and no more. A period of {1e3 * _ROUND * most:.2g} ms "

@@ -15,7 +15,8 @@ from rds.identification.fit.triangle import triangle_of
 from rds.identification.logs.log import Log
 from rds.identification.structures.structure import Structure
 
-_ABOVE = 1e-6  # of the units used: how near a bound that itself is no value may be come
+# how near a bound that itself is no value may be come: 1 µs, and next to nothing of an inertia in kg·m²
+_LEAST_TIME, _LEAST = 1e-6, 1e-15
 _STEP = 1e-4  # of a number's size: for differences where a structure has no derivatives of its own
 
 
@@ -61,7 +62,8 @@ class Problem:
         """The lowest and highest of every free number."""
         pairs = [self.structure.bounds(name) for name in self.names]
         options = [self.structure.parameters[name] for name in self.names]
-        pairs = [(max(low, o.above + _ABOVE), high) for (low, high), o in zip(pairs, options, strict=True)]
+        least = [option.above + (_LEAST_TIME if option.unit == "s" else _LEAST) for option in options]
+        pairs = [(max(low, above), high) for (low, high), above in zip(pairs, least, strict=True)]
         states = self.structure.state_bounds or ((-np.inf, np.inf),) * self.structure.states
         low, high = zip(*pairs, *(states * len(self.logs)), strict=True)
         return np.array(low), np.array(high)

@@ -22,6 +22,10 @@ from rds.machines.machine import Axis
 
 _ORDER = ("position", *(quantity for quantity in ("reference", *QUANTITIES) if quantity != "position"))
 _HELD = ("command",)  # between its samples a command stays what it was
+_IN_TURN = (
+    'where each row is a message with columns of its own, as PlotJuggler writes them, blanks = "hold" in the map '
+    "holds the last values beside each position"
+)
 
 
 @dataclass(frozen=True)
@@ -243,14 +247,18 @@ def _age(name: str, time: np.ndarray, grid: np.ndarray) -> Finding:
 def _without_blanks(
     arrays: dict[str, np.ndarray], time: np.ndarray, mapping: LogMap, table: Table, findings: list[Finding]
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    if mapping.blanks == "hold":
+        return _with_last_values(arrays, time, table, findings)
+    in_turn = _are_in_turn(arrays)
     good = np.isfinite(time)
     for name, values in arrays.items():
         finite = np.isfinite(values)
         if not finite.all() and mapping.blanks == "refuse":
             row = int(np.flatnonzero(~finite)[0])
+            advice = 'repair it, or leave such samples out with blanks = "drop" in the map'
             raise InputError(
                 f"{name} has no number in {int((~finite).sum())} of {len(values)} samples, first in sample {row}; "
-                'repair it, or leave such samples out with blanks = "drop" in the map',
+                f"{_IN_TURN if in_turn else advice}",
                 str(table.path),
             )
         good &= finite
@@ -263,11 +271,41 @@ def _without_blanks(
         )
     bad = int((~good).sum())
     if good.sum() < 2:
-        raise InputError("hardly a sample has a number in every column of the map", str(table.path))
+        what = "hardly a sample has a number in every column of the map"
+        raise InputError(f"{what}; {_IN_TURN}" if in_turn else what, str(table.path))
     row = int(np.flatnonzero(~good)[0])
     what = f"{bad} samples without a number in every column were left out, the first is sample {row}"
     findings.append(Finding("blanks", what, Gravity.WARNING, row))
     return {name: values[good] for name, values in arrays.items()}, time[good]
+
+
+def _are_in_turn(arrays: dict[str, np.ndarray]) -> bool:
+    """Whether most rows with a position lack another quantity that has numbers: rows of one message each."""
+    there = np.isfinite(arrays["position"])
+    others = [np.isfinite(values) for name, values in arrays.items() if name != "position"]
+    return any(finite.any() and 2 * int((there & finite).sum()) < int(there.sum()) for finite in others)
+
+
+def _with_last_values(
+    arrays: dict[str, np.ndarray], time: np.ndarray, table: Table, findings: list[Finding]
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The rows with time and position, and beside them the last value of each other quantity, of that row or above."""
+    rows = np.arange(len(time))
+    good = np.isfinite(time) & np.isfinite(arrays["position"])
+    last = {name: np.maximum.accumulate(np.where(np.isfinite(v), rows, -1)) for name, v in arrays.items()}
+    for name, at in last.items():
+        if not (early := good & (at < 0)).any():
+            continue
+        what = f"{int(early.sum())} samples before the first {name} were left out"
+        findings.append(Finding("blanks", what, Gravity.WARNING, int(np.flatnonzero(early)[0])))
+        good &= at >= 0
+    if good.sum() < 2:
+        raise InputError("hardly a sample has a position with every other column before it", str(table.path))
+    for name, at in last.items():
+        if oldest := int((rows - at)[good].max()):
+            what = f"of {name} the last value is held: it stands {int(np.median((rows - at)[good]))} rows above the "
+            findings.append(Finding("resampling", f"{what}position at the median, {oldest} at most"))
+    return {name: values[last[name][good]] for name, values in arrays.items()}, time[good]
 
 
 def _held(about: AxisMap) -> bool | None:

@@ -42,6 +42,7 @@ _FEW = 20  # rows of data that are looked at for how they end
 HEAD = 1 << 16  # bytes looked at
 _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
 _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
+_TREND = re.compile(r"\d\d:\d\d:\d\d;\d{1,6},")  # a time in a trend of Rockwell's Studio 5000
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
 
 
@@ -85,6 +86,10 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
                 best = (score, width, mark, point, first)
     if (beside := _of_tektronix(lines, encoding)) is not None:
         return beside
+    if any(line.startswith("Header:") for line in lines) and any(_TREND.search(line) for line in lines):
+        what = "it is a trend of Studio 5000, whose times have a semicolon before the fraction"
+        cure = "sed -E 's/(:[0-9]{2});([0-9]+),/\\1.\\2,/' FILE > log.csv"
+        raise InputError(f"{what}; put points there: `{cure}`", str(path))
     if best is None:
         shown = next((line for line in lines if line.strip()), "")
         remedy = "it needs columns of numbers, separated by commas, semicolons, tabs, bars or spaces"
@@ -269,7 +274,7 @@ def _passed(above: Sequence[str], delimiter: str, decimal: str, width: int, numb
         cells = split(line, delimiter)
         if len(cells) == width and len(numbers) > 1 and all(is_number(cells[i], decimal) for i in numbers):
             return line
-        if are_numbers([cell for cell in cells if cell]):
+        if are_numbers([cell for cell in cells if cell]) or are_numbers(line.split()):
             return line  # perhaps the first row, with a constant beside it
     return ""
 
@@ -343,7 +348,8 @@ def _below_labels(lines: Sequence[str], first: int, delimiter: str, decimal: str
 
 def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
     """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
-    above = [line for line in lines[:first] if line.strip()][-2:]
+    noted = [_note(line, delimiter, width) for line in lines[:first]]
+    above = [line for line, note in zip(lines, noted, strict=False) if line.strip() and note is None][-2:]
     below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
     ended = bool(below) and all(cells[-1] == "" for cells in below)  # a delimiter ends each row, and perhaps no heading
     rows = [_heading_cells(line + delimiter * ended, delimiter, width) for line in above]
@@ -369,8 +375,20 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
         if unit and units[i] and dimension(unit) and dimension(units[i] or "") and plain(unit) != plain(units[i] or ""):
             torn.append(f"{name} in {unit}, and {units[i]} below")
         units[i] = unit if unit is not None else units[i]
+    for note in noted:
+        if note is not None and note[0] in _UNIT_LABELS:
+            units = [unit or own or None for unit, own in zip(units, ["", *note[1]], strict=True)]
     of_labview = labview_units(lines[:first], lambda line: split(line, delimiter), names)
     return Headings(tuple(names), of_labview or tuple(units), torn=tuple(torn))
+
+
+def _note(line: str, delimiter: str, width: int) -> tuple[str, list[str]] | None:
+    """What a row below the headings notes of each signal, as Simulink's data inspector does: `,Units: mm,Units: V`."""
+    label, *cells = split(line, delimiter) or [""]
+    keys = {cell.partition(":")[0].strip().casefold() for cell in cells}
+    if label or width < 2 or len(cells) != width - 1 or len(keys) != 1 or not all(":" in cell for cell in cells):
+        return None
+    return keys.pop(), [cell.partition(":")[2].strip() for cell in cells]
 
 
 def _heading_cells(line: str, delimiter: str, width: int) -> list[str] | None:

@@ -381,6 +381,12 @@ def _end(path: Path, layout: Layout) -> tuple[int, Finding | None]:
     with open(path, "rb") as file:
         file.seek(max(0, size - _TAIL))
         tail = file.read()
+        if not tail.strip():  # a spreadsheet may have saved thousands of empty rows
+            file.seek(max(0, size - _BLOCK))
+            tail = file.read()
+    rows = tail.rstrip()
+    if rows and b"\n" in tail[len(rows) :]:
+        return size - len(tail) + tail.index(b"\n", len(rows)) + 1, None  # lines of nothing but blanks may follow
     if tail.endswith((b"\n", b"\r")):
         return size, None
     *before, last = tail.rstrip(b" \t").split(b"\n")

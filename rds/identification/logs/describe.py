@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from rds.identification.logs.steps import step_of
 from rds.identification.logs.table import Column
 
 GRAVITIES = (Gravity.FAULT, Gravity.WARNING, Gravity.NOTE)  # the worst first
+_NAMED = 3  # logs that are named where a finding is of some of them
 
 
 @dataclass(frozen=True)
@@ -107,22 +108,22 @@ def describe(
 
 
 def _gathered(logs: Iterable[Log], own: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings of all, each once, the gravest first; those of one log among several name it."""
+    """The findings of all, each once, the gravest first; those of some logs among several name them."""
     logs = list(logs)
     seen: dict[tuple[str, str], Finding] = {(f.kind, f.what): f for f in own}
-    counts: dict[tuple[str, str], int] = {}
+    names: dict[tuple[str, str], list[str]] = {}
     for log in logs:
         for finding in log.findings:
-            key = (finding.kind, finding.what)
-            counts[key] = counts.get(key, 0) + 1
+            known = names.setdefault((finding.kind, finding.what), [])
+            known += [] if log.name in known else [log.name]
     for log in logs:
         for finding in log.findings:
-            key = (finding.kind, finding.what)
-            if len(logs) > 1 and counts[key] == 1:
-                named = Finding(finding.kind, f"{log.name}: {finding.what}", finding.gravity, finding.sample)
-                seen[(finding.kind, named.what)] = named
-            else:
-                seen.setdefault(key, finding)
+            of = names[finding.kind, finding.what]
+            what = finding.what
+            if len(of) < len(logs):
+                rest = f" and {len(of) - _NAMED} more" if len(of) > _NAMED else ""
+                what = f"{', '.join(of[:_NAMED])}{rest}: {what}"
+            seen.setdefault((finding.kind, what), replace(finding, what=what))
     return tuple(sorted(seen.values(), key=lambda finding: GRAVITIES.index(finding.gravity)))
 
 

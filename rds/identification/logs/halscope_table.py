@@ -5,6 +5,8 @@ joint.0.motor-pos-cmd;pid.x.output
 # Position: 0.000000;0.000000
 # Scale: 5;5
 1.50000000000000;0.25000000000000          joint.0.motor-pos-cmd +1.50000000000000 pid.x.output +0.25000000000000
+
+Where the desktop has decimal commas, its numbers have them, too: +1,50000000000000.
 """
 
 from __future__ import annotations
@@ -51,7 +53,7 @@ def read_halscope(path: Path) -> Table:
     values = np.empty((len(rows), len(names)))
     for at, (number, cells) in enumerate(rows):
         try:
-            values[at] = [float(cell) for cell in cells]
+            values[at] = [_number(cell) for cell in cells]
         except ValueError:
             problem = f"it has not one number for each of the {len(names)} pins: the line is cut or damaged"
             raise InputError(f"{problem}; remove the line", f"{path}, line {number}") from None
@@ -68,9 +70,13 @@ def _is_row(line: str) -> bool:
     return bool(line.strip()) and not line.startswith("#")
 
 
+def _number(cell: str) -> float:
+    return float(cell.replace(",", "."))
+
+
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        _number(cell)
     except ValueError:
         return False
     return True

@@ -66,7 +66,7 @@ class LogMap:
     jitter_limit: float = JITTER_LIMIT
     duplicates: str = "refuse"  # or drop
     gaps: str = "refuse"  # or split: a log for each stretch between gaps; or keep: the command was held over them
-    blanks: str = "refuse"  # or drop: rows with an empty cell
+    blanks: str = "refuse"  # or drop: rows with an empty cell; or hold: the last value of each column goes on
     said: tuple[str, ...] = field(default=())
 
     @classmethod

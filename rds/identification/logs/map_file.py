@@ -103,7 +103,7 @@ MAP = Table(
         ),
         "duplicates": Choice("what is done with repeated times", ("refuse", "drop"), "refuse"),
         "gaps": Choice("what is done with gaps", ("refuse", "split", "keep"), "refuse"),
-        "blanks": Choice("what is done with rows that have an empty cell", ("refuse", "drop"), "refuse"),
+        "blanks": Choice("what is done with rows that have an empty cell", ("refuse", "drop", "hold"), "refuse"),
     },
     needed=("axis",),
 )

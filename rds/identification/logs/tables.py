@@ -23,7 +23,9 @@ MEASUREMENTS = (".mf4", ".mdf", ".dat")  # of which some are text, and some bus 
 _EXPORTS = {
     ".toml": "a model, a map or an experiment, and no log: `rds validate` takes the model first, then logs",
     ".tdms": "NI's TDMS: in LabVIEW write the channels by `Write To Measurement File` as text (LVM); or in Python "
-    "`nptdms.TdmsFile.read(FILE).as_dataframe(time_index=True).to_csv('log.csv', index_label='time [s]')`",
+    "`nptdms.TdmsFile.read(FILE).as_dataframe(time_index=True).to_csv('log.csv', index_label='time [s]')`; where "
+    "that says that no time properties are available, `as_dataframe().to_csv('log.csv', index=False)`, and the rate of "
+    "the samples in a map",
     **dict.fromkeys(
         (".xlsx", ".xls", ".ods"),
         "a spreadsheet: save the sheet with the samples as CSV (UTF-8), with the units in its headings (`pos [mm]`)",
@@ -45,7 +47,8 @@ _EXPORTS = {
     ),
     **dict.fromkeys(
         (".bag", ".db3", ".mcap"),
-        "a recording of ROS: export the topic as CSV, as PlotJuggler does, or `ros2 topic echo`",
+        "a recording of ROS: export the topics as CSV, as PlotJuggler does (of several topics, a map says "
+        'blanks = "hold"), or `ros2 topic echo`',
     ),
     ".json": "JSON: save the signals as columns of CSV, in Python by "
     "`pandas.DataFrame({'t [s]': ..., 'u [V]': ..., 'y [mm]': ...}).to_csv('log.csv', index=False)`",
