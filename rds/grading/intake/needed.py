@@ -118,7 +118,7 @@ def _follow(
         for each in body
         if isinstance(each, ast.Assign) and isinstance(each.value, ast.Name) and {*_set_by(each)} & makes.wanted
     }
-    seen = followed.Known(set(), set(), modules, functions, set(), handed)
+    seen = followed.with_methods(body, followed.Known(set(), set(), modules, functions, set(), handed))
     while before != (before := len(keep) + len(seen.data) + len(seen.code) + len(seen.changes_arguments)):
         seen.data |= mutable(body, known, functions.keys()) - modules.keys() - functions.keys()
         for number, statement in enumerate(body):
@@ -295,7 +295,10 @@ def _made_and_used(
     tables = top.get_children()
     while tables:
         table = tables.pop()
-        used |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
+        shared = [symbol for symbol in table.get_symbols() if symbol.is_global()]
+        used |= {symbol.get_name() for symbol in shared}
+        if not isinstance(statement, (*followed.FUNCTIONS, ast.ClassDef)):  # `[k := v for v in ...]`, or in an `if`
+            made |= {symbol.get_name() for symbol in shared if symbol.is_assigned()}
         tables += table.get_children()
     changed: set[str] = set()
     for tree in at_once(statement):
