@@ -135,6 +135,8 @@ def test_what_a_notebook_says_is_followed_in_little_memory() -> None:
             "cell 2, line 1 .*modules that are not there",
         ),
         ('best = min((rds.run(Kp=k).rms, k) for k in (1.0, 30.0))\nparams["Kp"] = best[1]', "cell 2, line 1 "),
+        ('def best():\n    global params\n    params = {"Kp": rds.run().rms}\nbest()', "cell 2, line 4 "),
+        ('def tune():\n    found = rds.run()\n    params["Kp"] = found.rms\ntune()', "cell 2, line 4 "),
     ],
 )
 def test_what_cannot_be_followed_is_refused_in_words(cell: str, said: str) -> None:
@@ -163,6 +165,7 @@ def test_what_cannot_be_followed_is_refused_in_words(cell: str, said: str) -> No
         "class Pid:\n    def __init__(self): self.i, self.k = 0.0, 0.0\n    def step(self, e):\n        self.i += e\n        return self.k * self.i\n    def share(self, e):\n        return self.k * e\npid = Pid()\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] + pid.step(y) + pid.share(y), state\ndef simulate(law):\n    return [law.step(e) for e in range(3)]\nus = simulate(pid)\nplt.plot(us)",
         "class Pid:\n    def __init__(self): self.i, self.k = 0.0, 0.0\n    def step(self, e):\n        self.i += e\n        return self.k * self.i\n    def share(self, e):\n        return self.k * e\npid = Pid()\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] + pid.step(y) + pid.share(y), state\nrds.Experiment(controller=pid.step).run()",
         "import numpy as np\nK = np.ones(2)\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] * K.max(), state\nplt.plot(K.argmax(), K.clip(0.0, 1.0), label=str(type(K)))",
+        "log = []\nold = control\ndef control(t, r, y, state, params):\n    log.append(y)\n    return old(t, r, y, state, params)\ndef tried():\n    log.clear()\n    return rds.run(control)\ntried()",
     ],
 )
 def test_experiments_that_change_nothing_are_left_out(cell: str) -> None:
