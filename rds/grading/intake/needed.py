@@ -153,6 +153,11 @@ def _leave_out(body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent:
             keep.discard(number)
             if not _set_later(body, keep, number, makes.facts[number][0]):
                 raise NotFollowed(statement.lineno, _NEEDS_MORE)
+    used = set().union(*(makes.facts[number][1] for number in keep))
+    for number in sorted(keep):  # modules that only these needed
+        names = {name for name, _ in imported(body[number])}
+        if any(not_there(body[number])) and names.isdisjoint(used | {"*"}):
+            keep.discard(number)
 
 
 def _from_experiments(function: ast.FunctionDef, absent: Set[str]) -> set[str]:
