@@ -692,10 +692,15 @@ def test_zips_that_students_hand_in(tmp_path: Path) -> None:
         "empty": own_zip({}),
         "history": own_zip({"controller.py": b"x", **{f".git/objects/{n:03}": b"" for n in range(MOST_OWN)}}),
     }
+    for place in (".venv/bin", "venv/lib/python3.12/site-packages", ".mypy_cache/3.12", ".vscode"):
+        files = {f"p/{place}/{n}.py": b"" for n in range(MOST_OWN)}
+        handed_in[f"tools {place.split('/')[0]}"] = own_zip({"p/controller.py": b"x", **files})
+    handed_in["data"] = own_zip({"controller.py": b"x", "log.csv": b"0" * (4 << 20)})
     for name, data in handed_in.items():
         (tmp_path / f"{name}.zip").write_bytes(data)
     found = of(tmp_path)
-    assert found["good"].read() == found["history"].read() == b"x"
+    good = [name for name in found if name in ("good", "history", "data") or name.startswith("tools ")]
+    assert len(good) == 7 and {found[name].read() for name in good} == {b"x"}
     with pytest.raises(Refusal, match="unpacks to more than"):
         found["large"].read()
     said = {"bomb": "says that it unpacks to", "many": "more than 200", "nested": "another zip", "broken": "not a zip"}

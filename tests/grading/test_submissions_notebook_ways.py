@@ -75,6 +75,20 @@ from tests.grading.test_submissions_notebooks import made
         'box = []\nbox += [params]\nbox[0]["Kp"] = 30.0',
         'class Tuner:\n    def __init__(self, p):\n        self.p = p\n    def set(self, k):\n        self.p["Kp"] = k\nt = Tuner(params)\nt.set(2.0)\nTuner(params).set(30.0)',
         'class Tuner:\n    def __init__(self, p):\n        self.p = p\nt = Tuner(params)\nt.p["Kp"] = 2.0\nTuner(p=params).p["Kp"] = 30.0',
+        'class G:\n    def __init__(self): self.k = 1.0\n    def cost(self, k):\n        self.k = k\n        return (k - 30.0) ** 2\ng = G()\nfrom scipy.optimize import minimize_scalar\nminimize_scalar(g.cost, tol=1e-12)\nparams["Kp"] = round(g.k)',
+        'class G:\n    k = 1.0\n    def cost(self, k):\n        self.k = k\ng = G()\nlist(map(g.cost, [2.0, 30.0]))\nparams["Kp"] = g.k',
+        'class G:\n    k = 1.0\n    def tune(self, k):\n        self.k = k\ng = G()\ntune = g.tune\ntune(30.0)\nparams["Kp"] = g.k',
+        'class G:\n    k = 1.0\n    def __call__(self, k):\n        self.k = k\ng = G()\ng(30.0)\nparams["Kp"] = g.k',
+        'class G:\n    k = 1.0\n    def __enter__(self):\n        self.k = 30.0\n    def __exit__(self, *a): pass\ng = G()\nwith g:\n    pass\nparams["Kp"] = g.k',
+        'class G:\n    k = 1.0\n    def __iter__(self):\n        self.k = 30.0\n        return iter([])\ng = G()\nfor _ in g:\n    pass\nparams["Kp"] = g.k',
+        'class G:\n    k = 1.0\n    def __matmul__(self, k):\n        self.k = k\ng = G()\nx = g @ 30.0\nparams["Kp"] = g.k',
+        'class G:\n    k = 1.0\ng = G()\ntype(g).k = 30.0\nparams["Kp"] = g.k',
+        'class Box:\n    p = params\nBox.p["Kp"] = 30.0',
+        'import numpy as np\nk = np.zeros(1)\nif True:\n    np.add.at(k, [0], 30.0)\nparams["Kp"] = float(k[0])',
+        'import numpy as np\nk = np.ones(1)\nif True:\n    np.multiply(k, 30.0, k)\nparams["Kp"] = float(k[0])',
+        'import numpy as np\nk = np.ones(1)\nnp.asarray(k)[0] = 30.0\nparams["Kp"] = float(k[0])',
+        'k = 1.0\n_ = [k := v for v in (2.0, 30.0)]\nparams["Kp"] = k',
+        'k = 1.0\nif True:\n    def tune():\n        global k\n        k = 30.0\n    tune()\nparams["Kp"] = k',
     ],
 )
 def test_a_gain_that_is_set_in_an_unusual_way_is_graded(cell: str) -> None:
@@ -121,6 +135,8 @@ def test_what_a_notebook_says_is_followed_in_little_memory() -> None:
             "cell 2, line 1 .*modules that are not there",
         ),
         ('best = min((rds.run(Kp=k).rms, k) for k in (1.0, 30.0))\nparams["Kp"] = best[1]', "cell 2, line 1 "),
+        ('def best():\n    global params\n    params = {"Kp": rds.run().rms}\nbest()', "cell 2, line 4 "),
+        ('def tune():\n    found = rds.run()\n    params["Kp"] = found.rms\ntune()', "cell 2, line 4 "),
     ],
 )
 def test_what_cannot_be_followed_is_refused_in_words(cell: str, said: str) -> None:
@@ -143,13 +159,20 @@ def test_what_cannot_be_followed_is_refused_in_words(cell: str, said: str) -> No
         'import sys\nif "google.colab" in sys.modules:\n    !pip install rds',
         "experiment = rds.Experiment(controller=globals(), duration=2.0)\nexperiment.run()\nrds.check(globals())",
         "def simulate(law, params):\n    ys = []\n    for k in range(9):\n        ys.append(law(0.0, 0.0, 1.0, None, params))\n    return ys\nys = simulate(control, params)",
+        'class Pid:\n    def __init__(self): self.i, self.k = 0.0, 0.0\n    def step(self, e):\n        self.i += e\n        return self.k * self.i\n    def share(self, e):\n        return self.k * e\npid = Pid()\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] + pid.step(y) + pid.share(y), state\nus = [pid.step(e) for e in range(3)]\nplt.plot(us)\nu = pid.step(2.0)\nplt.title(f"{u}")',
+        "class Pid:\n    def __init__(self): self.i, self.k = 0.0, 0.0\n    def step(self, e):\n        self.i += e\n        return self.k * self.i\n    def share(self, e):\n        return self.k * e\npid = Pid()\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] + pid.step(y) + pid.share(y), state\nplt.plot([pid.share(e) for e in range(3)])\nplt.plot(pid.share(2.0))",
+        "class Pid:\n    def __init__(self): self.i, self.k = 0.0, 0.0\n    def step(self, e):\n        self.i += e\n        return self.k * self.i\n    def share(self, e):\n        return self.k * e\npid = Pid()\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] + pid.step(y) + pid.share(y), state\ndef simulate():\n    own = Pid()\n    return [own.step(e) for e in range(3)]\nplt.plot(simulate())",
+        "class Pid:\n    def __init__(self): self.i, self.k = 0.0, 0.0\n    def step(self, e):\n        self.i += e\n        return self.k * self.i\n    def share(self, e):\n        return self.k * e\npid = Pid()\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] + pid.step(y) + pid.share(y), state\ndef simulate(law):\n    return [law.step(e) for e in range(3)]\nus = simulate(pid)\nplt.plot(us)",
+        "class Pid:\n    def __init__(self): self.i, self.k = 0.0, 0.0\n    def step(self, e):\n        self.i += e\n        return self.k * self.i\n    def share(self, e):\n        return self.k * e\npid = Pid()\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] + pid.step(y) + pid.share(y), state\nrds.Experiment(controller=pid.step).run()",
+        "import numpy as np\nK = np.ones(2)\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] * K.max(), state\nplt.plot(K.argmax(), K.clip(0.0, 1.0), label=str(type(K)))",
+        "log = []\nold = control\ndef control(t, r, y, state, params):\n    log.append(y)\n    return old(t, r, y, state, params)\ndef tried():\n    log.clear()\n    return rds.run(control)\ntried()",
+        'import math, no_such\nfor k in (1.0, 2.0):\n    params["Kp"] = k\n    no_such.plot(k)\nparams["Kp"] = math.fsum([30.0])',
+        'import no_such\nfor k in (1.0, 2.0):\n    params["Kp"] = k\n    no_such.plot(k)\nparams["Kp"] = 30.0',
     ],
 )
 def test_experiments_that_change_nothing_are_left_out(cell: str) -> None:
     """What honest notebooks do with their law: nothing of it is refused, and nothing that needs more is run."""
-    head = (
-        'import rds\nparams = {"Kp": 30.0}\n\ndef control(t, r, y, state, params):\n    return params["Kp"] * y, state'
-    )
+    head = 'import matplotlib.pyplot as plt\nimport rds\nparams = {"Kp": 30.0}\n\ndef control(t, r, y, state, params):\n    return params["Kp"] * y, state'
     found = made(head, cell)
     assert found["control"](0.0, 0.0, 1.0, None, found["params"])[0] == 30.0  # type: ignore[operator]
     assert not found.keys() & {"experiment", "df", "ys", "run"}

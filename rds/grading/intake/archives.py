@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from rds.core.errors import InputError
-from rds.grading.intake.items import ARCHIVE, DEEPEST, MOST_FILES, Item, Refusal, faulty, is_clutter
+from rds.grading.intake.items import ARCHIVE, CODE, DEEPEST, MOST_FILES, Item, Refusal, faulty, is_clutter
 
 LARGEST_OWN = 4 << 20  # bytes of a zip that a student hands in
 MOST_OWN = 200  # files in it
@@ -47,7 +47,9 @@ def files_in_own(item: Item) -> list[Item]:
     entries = [entry for entry in archive.infolist() if not is_clutter(_parts(entry))]
     if len(entries) > MOST_OWN:
         raise Refusal(f"its zip holds {len(entries)} files, more than {MOST_OWN}; hand in one Python file or notebook")
-    unpacked = sum(entry.file_size for entry in entries)
+    unpacked = sum(
+        entry.file_size for entry in entries if entry.filename.lower().endswith(CODE)
+    )  # nothing else is read
     if unpacked > max(LARGEST_RATIO * len(data), _RATIO_COUNTS_FROM):
         raise Refusal(f"its zip of {len(data)} bytes says that it unpacks to {unpacked}; hand in one Python file")
     items, _ = _items(archive, entries)

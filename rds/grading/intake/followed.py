@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 NOTHING, READS, GIVES, CHANGES = range(4)
@@ -18,21 +18,28 @@ an object; it changes them, or its value does when it is called."""
 
 _SCALAR = frozenset(
     {"print", "display", "len", "float", "int", "str", "repr", "round", "abs", "isinstance", "sum", "bool", "format"}
-    | {"hash", "id", "any", "all", "range", "callable", "hasattr", "divmod", "pow", "complex", "type"}
+    | {"hash", "id", "any", "all", "range", "callable", "hasattr", "divmod", "pow", "complex"}
 )
-_COPIES = frozenset({"dict", "list", "tuple", "set", "frozenset", "sorted", "copy", "deepcopy", "array", "asarray"})
-_GIVING = frozenset({"zip", "enumerate", "reversed", "filter", "map", "min", "max", "iter"})
+_COPIES = frozenset({"dict", "list", "tuple", "set", "frozenset", "sorted", "copy", "deepcopy", "array"})
+_GIVING = frozenset({"zip", "enumerate", "reversed", "filter", "map", "min", "max", "iter", "type"})
 _READING = frozenset(
     {"get", "keys", "values", "items", "copy", "index", "count", "format", "join", "split", "strip"}
     | {"tolist", "mean", "sum", "min", "max", "std", "any", "all", "astype", "flatten", "round", "ravel", "reshape"}
-    | {"dot", "transpose", "item", "conj", "cumsum"}
+    | {"dot", "transpose", "item", "conj", "cumsum", "prod", "cumprod", "var", "argmax", "argmin", "argsort", "nonzero"}
+    | {"clip", "squeeze", "diagonal", "trace", "ptp", "take", "repeat", "swapaxes", "searchsorted"}
 )
 _METHODS = frozenset([*dir(dict), *dir(list), *dir(set), "fill", "put", "appendleft", "popleft", "rotate"])
 """Of tables, lists and arrays: `put = params.update` hands on what changes the data; other attributes are data."""
 
 _PURE = frozenset({"numpy", "math", "cmath", "json", "statistics", "copy", "scipy", "control", "pprint", "itertools"})
-_CHANGING_OF_PURE = frozenset({"fill", "copyto", "put", "place", "putmask", "shuffle", "fill_diagonal"})
+_CHANGING_OF_PURE = frozenset(
+    {"fill", "copyto", "put", "put_along_axis", "place", "putmask", "shuffle", "fill_diagonal", "at"}
+)
+_OF_TWO = frozenset({"add", "subtract", "multiply", "divide", "true_divide", "power", "maximum", "minimum", "mod"})
+"""Functions of numpy that put the result into what is given after two arguments."""
 _NAMESPACES = frozenset({"exec", "eval", "globals", "locals"})
+_BY_NAME = frozenset({"__init__", "__post_init__", "__new__", "__call__", "__setitem__", "__delitem__", "__setattr__"})
+"""Methods of Python's own that are not called by operators, loops and `with`."""
 _EXPRESSIONS = (ast.BinOp, ast.UnaryOp, ast.Compare, ast.JoinedStr, ast.FormattedValue)
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.GeneratorExp, ast.DictComp)
@@ -49,6 +56,10 @@ class Known:
     absent: Set[str]  # modules that are not there, and what comes from them
     graded: set[str]  # functions that are graded: an experiment that is handed one does not change it
     changes_arguments: set[str] = field(default_factory=set)
+    # of the notebook: by class the names in it, or None where its objects share what can be changed
+    classes: Mapping[str, Set[str] | None] = field(default_factory=dict)
+    methods: Set[str] = frozenset()  # of these classes, those that may change what they are called on
+    reading: Mapping[str, bool] = field(default_factory=dict)  # the others: whether they spare their arguments, too
 
     def within(self, hidden: Iterable[str], data: Iterable[str] = ()) -> Known:
         """The same inside a function, whose own names are `hidden`; of these, `data` are graded data."""
@@ -61,6 +72,9 @@ class Known:
             self.absent - own,
             self.graded - own,
             self.changes_arguments,
+            self.classes,
+            self.methods,
+            self.reading,
         )
 
 
@@ -125,6 +139,7 @@ def rank(node: ast.AST | None, known: Known) -> int:
         if base == GIVES and not isinstance(node.ctx, ast.Load):
             return CHANGES
         is_method = isinstance(node, ast.Attribute) and node.attr not in _READING and node.attr in _METHODS
+        is_method |= isinstance(node, ast.Attribute) and node.attr in known.methods
         return CHANGES if base == GIVES and is_method else base
     if isinstance(node, ast.Lambda):
         inner = rank(node.body, known.within(each.arg for each in ast.walk(node.args) if isinstance(each, ast.arg)))
@@ -147,7 +162,15 @@ def rank(node: ast.AST | None, known: Known) -> int:
         return NOTHING
     ranks = [rank(child, known) for child in ast.iter_child_nodes(node)]
     found = max(ranks, default=NOTHING)
-    return min(found, READS) if isinstance(node, _EXPRESSIONS) and found < CHANGES else found
+    if isinstance(node, _EXPRESSIONS):
+        found = _used(found, known)
+        return READS if found == GIVES else found
+    return found
+
+
+def _used(found: int, known: Known) -> int:
+    """The rank of what an operator, a loop or `with` uses, by methods that the text does not name."""
+    return CHANGES if found == GIVES and any(m[:2] == "__" for m in known.methods - _BY_NAME) else found
 
 
 def _of_base(node: ast.expr, known: Known) -> int:
@@ -169,7 +192,7 @@ def _of_call(node: ast.Call, known: Known) -> int:
     ranks = [rank(each, known) for each in given]
     most = max(ranks, default=NOTHING)
     if root(node.func) in known.absent:
-        handed = [each for each in given if not (isinstance(each, ast.Name) and each.id in known.graded)]
+        handed = [each for each in given if not _is_tried(each, known)]
         return CHANGES if any(rank(each, known) == CHANGES for each in handed) else NOTHING
     if most == CHANGES:
         return CHANGES
@@ -180,8 +203,15 @@ def _of_call(node: ast.Call, known: Known) -> int:
     if base == CHANGES:
         return CHANGES
     last = node.func.attr if isinstance(node.func, ast.Attribute) else name
+    if base == GIVES and last in known.reading and (most < GIVES or known.reading[last]):
+        return GIVES
     if base == GIVES and isinstance(node.func, ast.Attribute):
         return CHANGES if last not in _READING else READS if last == "copy" else GIVES
+    if base == GIVES and "__call__" in known.methods and name not in known.classes:
+        return CHANGES
+    within = known.classes.get(name)
+    if base == GIVES and most < GIVES and within is not None and not (within - {name}) & known.data:
+        return READS  # a new object
     if base >= READS or most < GIVES:
         return READS if most else base
     if name in known.functions:
@@ -190,10 +220,17 @@ def _of_call(node: ast.Call, known: Known) -> int:
     if last in _COPIES and all(isinstance(each, ast.Name) for each in given):
         return READS
     if module in _PURE and last not in _CHANGING_OF_PURE and all(word.arg != "out" for word in node.keywords):
-        return GIVES
+        return CHANGES if last in _OF_TWO and len(node.args) > 2 else GIVES
     if not module and name in _SCALAR:
         return READS
     return GIVES if not module and name in _GIVING | _COPIES else CHANGES
+
+
+def _is_tried(node: ast.expr, known: Known) -> bool:
+    """Whether it is what is graded, or a method, which an experiment calls and does not change."""
+    if isinstance(node, ast.Attribute):
+        return node.attr in known.methods and isinstance(node.value, ast.Name)
+    return isinstance(node, ast.Name) and node.id in known.graded
 
 
 def effect(statement: ast.AST, known: Known) -> int:
@@ -209,7 +246,12 @@ def effect(statement: ast.AST, known: Known) -> int:
     found = NOTHING
     for targets, value in _bindings(statement):
         got = rank(value, known)
+        if isinstance(statement, ast.For | ast.AsyncFor) and value is statement.iter:
+            got = _used(got, known)
         found = max(found, got)
+        if got == CHANGES:  # what a method gives that changes its object does not change it once more
+            reading = {**known.reading, **dict.fromkeys(known.methods, True)}
+            got = rank(value, replace(known, reading=reading, changes_arguments=set()))
         for target in targets:
             found = max(found, _bind(target, got, known))
     for name, value in _put_into(statement):
@@ -226,7 +268,7 @@ def effect(statement: ast.AST, known: Known) -> int:
         if isinstance(child, ast.stmt | ast.ExceptHandler | ast.match_case):
             found = max(found, effect(child, known))
         elif isinstance(child, ast.withitem):
-            found = max(found, rank(child.context_expr, known))
+            found = max(found, _used(rank(child.context_expr, known), known))
         elif isinstance(child, ast.expr) and isinstance(getattr(child, "ctx", ast.Load()), ast.Load):
             found = max(found, rank(child, known))
     return found
@@ -324,6 +366,47 @@ def _of_body(function: ast.FunctionDef | ast.AsyncFunctionDef, inside: Known, al
     return inner or any(rank(each, inside) >= GIVES for each in handed)
 
 
+def with_methods(body: Sequence[ast.stmt], known: Known) -> Known:
+    """`known` with the classes of the notebook, and which of their methods may change what they are called on."""
+    classes = [each for each in body if isinstance(each, ast.ClassDef)]
+    for each in classes:
+        is_own = not (each.bases or each.keywords) and all(map(_is_own, each.body))
+        known.classes = {**known.classes, each.name: names_in(each) if is_own else None}
+    inner = chain.from_iterable(each.body for each in classes)
+    methods = [each for each in inner if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef) and each.args.args]
+    stored = {
+        node.attr
+        for node in chain.from_iterable(map(ast.walk, body))
+        if isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load)
+    }
+    changing: set[str] = set()
+    before = -1
+    while before != (before := len(changing)):
+        known.methods = frozenset(changing)
+        reading: dict[str, bool] = {}
+        for method in methods:
+            own = {node.arg for node in ast.walk(method.args) if isinstance(node, ast.arg)}
+            if _of_body(method, known.within(own, [method.args.args[0].arg]), also_handing_out=False):
+                changing.add(method.name)
+            elif method.name not in stored | _METHODS:
+                spares = not _of_body(method, known.within(own, own), also_handing_out=False)
+                reading[method.name] = spares and reading.get(method.name, True)
+        known.reading = {name: spares for name, spares in reading.items() if name not in changing}
+    return known
+
+
+def _is_own(statement: ast.stmt) -> bool:
+    """Whether a statement in a class gives its objects nothing that they share, and can change."""
+    if isinstance(statement, FUNCTIONS):
+        return all(
+            isinstance(each, ast.Constant) for each in (*statement.args.defaults, *statement.args.kw_defaults) if each
+        )
+    is_plain = isinstance(statement, ast.Expr | ast.Assign | ast.AnnAssign) and isinstance(
+        statement.value, ast.Constant | None
+    )
+    return is_plain or isinstance(statement, ast.Pass)
+
+
 def _of_class(statement: ast.ClassDef, known: Known) -> int:
     at_once = max((rank(each, known) for each in (*statement.bases, *statement.decorator_list)), default=NOTHING)
     inside = known.within(())
@@ -333,6 +416,8 @@ def _of_class(statement: ast.ClassDef, known: Known) -> int:
                 known.code.add(statement.name)
         else:
             at_once = max(at_once, effect(each, inside))
+    if inside.data - known.data:
+        known.data.add(statement.name)
     if at_once == CHANGES:
         known.code.add(statement.name)
     return at_once

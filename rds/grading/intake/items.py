@@ -13,6 +13,7 @@ DEEPEST = 12  # folders in folders
 
 # what computers leave beside the files of their users
 _CLUTTER = {"__MACOSX", "__pycache__", ".DS_Store", ".ipynb_checkpoints", ".git", "Thumbs.db", "desktop.ini"}
+_CLUTTER |= {".venv", "site-packages", ".idea", ".vscode", ".mypy_cache", ".pytest_cache", ".ruff_cache"}
 
 
 class Refusal(Exception):

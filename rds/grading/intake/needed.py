@@ -72,8 +72,15 @@ def needed(body: Sequence[ast.stmt], wanted: set[str]) -> tuple[set[int], tuple[
     there_too = [wider[id(names)] for names in absent]
     _follow(body, makes, keep, known, there_too)
     _leave_out(body, makes, keep, there_too)
-    called = {name for number, statement in enumerate(body) if number not in keep for name in _called(statement)}
-    return keep, tuple(sorted(name for name in called & elsewhere.keys() if elsewhere[name].names & known))
+    left_out = set()
+    functions = {each.name: each for each in body if isinstance(each, ast.FunctionDef)}
+    for number, name in ((n, name) for n, each in enumerate(body) if n not in keep for name in _called(each)):
+        if name in elsewhere and elsewhere[name].names & known:
+            left_out.add(name)
+            given = _from_experiments(functions[name], there_too[number]) & elsewhere[name].names & known
+            if given and not _set_later(body, keep, number, given):
+                raise NotFollowed(body[number].lineno, _NEEDS_MORE)
+    return keep, tuple(sorted(left_out))
 
 
 class NotFollowed(Exception):
@@ -118,7 +125,7 @@ def _follow(
         for each in body
         if isinstance(each, ast.Assign) and isinstance(each.value, ast.Name) and {*_set_by(each)} & makes.wanted
     }
-    seen = followed.Known(set(), set(), modules, functions, set(), handed)
+    seen = followed.with_methods(body, followed.Known(set(), set(), modules, functions, set(), handed))
     while before != (before := len(keep) + len(seen.data) + len(seen.code) + len(seen.changes_arguments)):
         seen.data |= mutable(body, known, functions.keys()) - modules.keys() - functions.keys()
         for number, statement in enumerate(body):
@@ -146,6 +153,22 @@ def _leave_out(body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent:
             keep.discard(number)
             if not _set_later(body, keep, number, makes.facts[number][0]):
                 raise NotFollowed(statement.lineno, _NEEDS_MORE)
+    used = set().union(*(makes.facts[number][1] for number in keep))
+    for number in sorted(keep):  # modules that only these needed
+        names = {name for name, _ in imported(body[number])}
+        if any(not_there(body[number])) and names.isdisjoint(used | {"*"}):
+            keep.discard(number)
+
+
+def _from_experiments(function: ast.FunctionDef, absent: Set[str]) -> set[str]:
+    """The names that a function gives values to, or to whose parts, which come from modules that are not there."""
+    found: set[str] = set()
+    before = -1
+    while before != (before := len(found)):
+        for targets, value in map(bound, ast.walk(function)):
+            if value is not None and followed.names_in(value) & (absent | found):
+                found |= set(map(followed.root, targets)) | set().union(*map(followed.names_in, targets))
+    return found
 
 
 def _set_later(body: Sequence[ast.stmt], keep: set[int], number: int, names: set[str]) -> bool:
@@ -295,7 +318,10 @@ def _made_and_used(
     tables = top.get_children()
     while tables:
         table = tables.pop()
-        used |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
+        shared = [symbol for symbol in table.get_symbols() if symbol.is_global()]
+        used |= {symbol.get_name() for symbol in shared}
+        if not isinstance(statement, (*followed.FUNCTIONS, ast.ClassDef)):  # `[k := v for v in ...]`, or in an `if`
+            made |= {symbol.get_name() for symbol in shared if symbol.is_assigned()}
         tables += table.get_children()
     changed: set[str] = set()
     for tree in at_once(statement):

@@ -57,6 +57,7 @@ def converted(data: bytes, wanted: Sequence[str] = INTERFACE) -> Converted:
             notes.append(f"cell {number}: {skipped} of IPython's own commands left out")
     text = "\n".join(lines) + "\n"
     try:
+        text = _with_single_imports(text)
         body = ast.parse(text).body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         if isinstance(error, SyntaxError) and error.lineno is not None and 2 < error.lineno <= len(lines):
@@ -181,6 +182,17 @@ def _fault(source: str) -> int | None:
     except (ValueError, RecursionError, MemoryError):
         return 0
     return None
+
+
+def _with_single_imports(text: str) -> str:
+    """`import numpy as np, pandas as pd` as two statements of one line: it may be that only one of them is there."""
+    lines = [_encoded(line) for line in text.split("\n")]  # columns are counted in bytes
+    for each in reversed(ast.parse(text).body):
+        if isinstance(each, ast.Import) and len(each.names) > 1 and each.lineno == each.end_lineno:
+            line = lines[each.lineno - 1]
+            one_by_one = "; ".join(ast.unparse(ast.Import([name])) for name in each.names)
+            lines[each.lineno - 1] = line[: each.col_offset] + _encoded(one_by_one) + line[each.end_col_offset :]
+    return "\n".join(line.decode("utf-8", "surrogatepass") for line in lines)
 
 
 def _only(text: str, body: Sequence[ast.stmt], keep: set[int]) -> str:

@@ -85,14 +85,11 @@ assert libc.mlockall(3) == -1
 assert libc.mlock(b"x" * 4096, 4096) == -1
 """
 _SPIN_CHILDREN = """
-import os, signal, time
-signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits: their time is in no sum
-while True:
-    if os.fork() == 0:
-        end = time.process_time() + 0.005
-        while time.process_time() < end: pass
-        os._exit(0)
-    time.sleep(0.005)
+import signal
+for handler in (signal.SIG_IGN, signal.SIG_DFL, lambda *a: None):
+    try: signal.signal(signal.SIGCHLD, handler)
+    except PermissionError: continue
+    raise SystemExit("children that are ignored are in no sum")
 """
 
 ATTACKS = {
@@ -102,7 +99,7 @@ ATTACKS = {
     "a bomb of threads": Attack(
         "import threading, time\nwhile True: threading.Thread(target=time.sleep, args=(600,)).start()", LOAD, "thread"
     ),
-    "children whose time is in no sum": Attack(_SPIN_CHILDREN, TIMED_OUT, "no answer|time"),
+    "children whose time is in no sum": Attack(_SPIN_CHILDREN),
     "memory at once": Attack("x = bytearray(1 << 40)", LOAD, "MemoryError"),
     "memory bit by bit": Attack("x = []\nwhile True: x.append(bytearray(1 << 20))", LOAD, "MemoryError"),
     "memory in a sample": Attack(in_control("x = [0] * 10 ** 9"), CONTRACT, "MemoryError"),
