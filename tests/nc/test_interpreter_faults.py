@@ -117,6 +117,7 @@ FAULTS = [
     ("CYCLE81(10,0,2,-5)\nM2", 1, 0, "", "the language of Siemens' controls"),
     ("R1=5\nM2", 1, 0, "", "R1 = 5 is #1 = 5 here"),
     ("#<cr=5\nM2", 1, 2, "<", ">"),
+    ("O1 IF [1]\n  ENDIF ; of it\nM2", 2, 0, "", "write it before, as O1 ENDIF"),
     ("DPRNT[X#1[42]]\nM2", 1, 0, "", "write (PRINT, ...)"),
     ("G0 X1\nG1 Y1 ,R2 F9\nM2", 2, 7, ",", "round and break corners on other controls"),
     ("#1 = #2 + 1\nM2", 1, 9, "+1", "an expression stands in brackets"),

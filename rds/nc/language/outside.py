@@ -74,6 +74,10 @@ _HEIDENHAIN = (
     "this is Heidenhain's conversational language, which is not read here; have the part's program written for"
     " LinuxCNC: L X+10 R0 F200 is G1 X10 F200 here"
 )
+_NO_LABEL = (
+    "the O word that this word of a branch, a loop or a subroutine belongs to is missing; write it before, as O1 ENDIF"
+    " for O1 IF"
+)
 _PRINTED = "DPRNT, BPRNT, POPEN and PCLOS print on Fanuc's controls; write (PRINT, ...)"
 # Of lines that cannot be read, without blanks and in lower case: what they are the language of, in order.
 _LANGUAGES = tuple(
@@ -89,6 +93,11 @@ _LANGUAGES = tuple(
             _SIEMENS,
         ),
         (r"(?:n[0-9]+)?(?:[bd]prnt\[|popen$|pclos$)", _PRINTED),
+        (
+            r"(?:n[0-9]+)?(?:else(?:$|[(;]|if\[)|end(?:if|while|repeat|sub)|(?:sub|return|break|continue|call)(?:$|[(;\[])"
+            r"|repeat\[)",
+            _NO_LABEL,
+        ),
         (r"(?:n[0-9]+)?(?:if\[|while\[|goto|do[0-9]|end[0-9])", FANUC_MACRO),
     )
 )
