@@ -17,6 +17,7 @@ from rds.nc.configuration import configured
 from rds.nc.language.canon import Call, MotionBlock
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.reading_on import Later, faults_never_run
+from rds.nc.lathe_words import meant_otherwise
 from rds.nc.passed_over import Report
 from rds.nc.path_block import PathBlock
 from rds.nc.setup import Setup
@@ -141,6 +142,10 @@ def validator_of(program: Path, machine: Machine, setup: Setup) -> Validator:
     validator = Validator(own, setup.tool_list(), str(program))
     for remark in remarks:
         validator.warn(remark)
+    if "Y" not in own.axes and program.stat().st_size <= _LARGEST_READ_TWICE:
+        with program.open(encoding="latin-1") as lines:
+            for line, word, said in meant_otherwise(lines):
+                validator.warn(ProgramError(said, file=str(program), line=line), word)
     return validator
 
 

@@ -63,6 +63,16 @@ DataType=0x0006
 AccessType=ro
 LowLimit=
 HighLimit=n/a
+[1017]
+ParameterName=Heartbeats, as a DCF has them
+DataType=0x0006
+DefaultValue=0
+ParameterValue=0x64
+[1018Sub3]
+ParameterName=Revision
+DataType=7
+DefaultValue=3
+ParameterValue=
 [1014]
 ParameterName=Emergency
 DataType=0x0007
@@ -102,6 +112,7 @@ def test_what_makers_write_is_read(encode: object, tmp_path: Path) -> None:
     assert (device.vendor_number, device.product_number) == (None, 0x1A2B)
     assert (device.vendor_name, device.product_name) == ("Geräte", "Axis 5°")
     assert (found[0x1018][1].default, found[0x1018][2].default) == (0x9A, 10)
+    assert (found[0x1017].default, found[0x1018][3].default) == (100, 3)
     assert found[0x1003][3].data_type == 7 and 4 not in list(found[0x1003])
     assert found[0x603F].name == "Error code" and (found[0x603F].min, found[0x603F].max) == (None, None)
     assert (found[0x1014].default, found[0x1400][1].default) == (0x85, 0x205)

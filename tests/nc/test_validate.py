@@ -298,3 +298,17 @@ def test_what_a_student_hardly_means_is_worth_a_warning(tmp_path: Path) -> None:
     said = [(warning.line, warning.reason) for warning in found.warnings]
     assert (2, "a dwell of 2000 s, 33.3 minutes: P is in seconds here") in said
     assert any(line == 3 and "with a diameter of 0 moves nothing aside" in reason for line, reason in said)
+
+
+def test_cycles_of_other_lathes_are_told_where_they_would_be_something_else(tmp_path: Path) -> None:
+    """Fanuc's G90, G92 and G94 with X, Z and F turn; here one is a rapid through the work."""
+    file = tmp_path / "part.ngc"
+    text = "G21 G18 G8 G99\nG0 X15 Z2\nG90 X14 (a cut) Z-15 F0.2\nG92 X14.4 Z-15 F1.5\nG90 G1 X9 F20\nG90 X2\nM2\n"
+    file.write_text(text)
+    found, _ = check_program(file, load_machine("lathe"), Setup())
+    assert [(told.line, told.word) for told in found.warnings] == [(3, "G90"), (4, "G92"), (1, "G99")]
+    assert "at rapid after G0" in found.warnings[0].reason
+    assert "write G95" in found.warnings[2].reason
+    file.write_text(text.replace("G90 G1", "G81 Z1 R3 F9\nG90 G1"))
+    assert "G99" not in [told.word for told in check_program(file, load_machine("lathe"), Setup())[0].warnings]
+    assert not check_program(file, load_machine("mini-cnc"), Setup())[0].warnings

@@ -115,11 +115,13 @@ class Control(Branches):
             begins = (
                 f"by O{name} on a line of its own, ended by M99" if by_number else f"between O<{name}> SUB and ENDSUB"
             )
+            times, number = divmod(int(name), 10_000) if by_number else (0, 0)
+            counted = f"; as of Fanuc ({times} times O{number}), write M98 P{number} L{times}" if times else ""
             raise self._fault_at(
                 label,
                 word,
                 f"the subroutine {name} is not defined in {self.source.name or 'the program'} after the call; define it"
-                f" {begins}, or in a file {name}.ngc beside the program",
+                f" {begins}, or in a file {name}.ngc beside the program{counted}",
             )
         if self.skipping:
             label = self._labels.get(self.skipping, Label("", self.source, self._since_place))

@@ -9,12 +9,11 @@ from rds.nc.language.blocks import AXES
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
-from rds.nc.language.outside import FANUC_MACRO, OLD_LINE_ENDS
+from rds.nc.language.outside import OLD_LINE_ENDS, other_language
 from rds.nc.language.source import Source
 from rds.nc.language.words import column_of, place_of, recoded, word_at
 
 _SCRIPT = re.compile(r"(?:n[0-9]+)?(rf[0-9]|build)")
-_FANUC_MACRO = re.compile(r"(?:n[0-9]+)?(?:if\[|while\[|goto|do[0-9]|end[0-9])")
 _NO_SCRIPT = "a configuration script stands at the program's head, before its first block; move this line there"
 _SCRIPT_IS_OFF = "this is a line of a configuration script; read the program with the option ncc (--with ncc)"
 
@@ -23,8 +22,8 @@ def as_it_is_meant(fault: Fault, raw: bytes, text: str, options: Dialect) -> Fau
     """The fault of a line `raw`, which is `text`; where it is of another language, told by its name."""
     if _SCRIPT.match(text):
         return Fault(_NO_SCRIPT if options.ncc else _SCRIPT_IS_OFF)  # of the line: its words mean nothing here
-    if _FANUC_MACRO.match(text):
-        return Fault(FANUC_MACRO)
+    if said := other_language(text):
+        return Fault(said)
     return Fault(OLD_LINE_ENDS) if b"\r" in raw.strip() else fault
 
 

@@ -21,6 +21,7 @@ _G = {
     320: "G32 cuts a thread on other controls; write G33 with K, the way for each turn",
     500: "G50 ends scaling, or limits the spindle on lathes of other controls; leave it out (D of G96 limits it)",
     510: "G51 scales the coordinates on other controls; let the CAM program scale them, or use parameters",
+    541: "G54.1 P takes further coordinate systems of Fanuc's controls; write G54 to G59.3",
     600: "G60 goes to a place from one side on other controls; write G61.1 and the moves",
     650: "G65 calls a macro of other controls; write O<name> CALL [...]",
     660: "G66 calls a macro after each move on other controls; write O<name> CALL after them",
@@ -34,6 +35,7 @@ _G = {
 _M = {
     10: "M10 clamps an axis on other controls; leave it out",
     11: "M11 releases an axis on other controls; leave it out",
+    17: "M17 ends a subroutine of Siemens' controls; write M99, or O<name> ENDSUB",
     97: "M97 calls part of a program on other controls; write O<name> CALL",
     82: "M82 counts the filament of 3-D printers absolutely; let a CAM program write the part for a mill",
     83: "M83 counts the filament of 3-D printers from move to move; let a CAM program write the part for a mill",
@@ -63,6 +65,41 @@ _LETTERS = {
 FANUC_MACRO = (
     "IF, WHILE, DO, END and GOTO alone are Fanuc's macro language; write O1 IF [...] and O1 ENDIF, O1 WHILE [...] and"
     " O1 ENDWHILE on lines of their own"
+)
+_SIEMENS = (
+    "this is the language of Siemens' controls, which is not read here; have the part's program written for LinuxCNC:"
+    " R1 = 5 is #1 = 5 here, CR=5 is R5, TRANS is G52, MSG(...) is (MSG, ...), CYCLE81(...) is G81"
+)
+_HEIDENHAIN = (
+    "this is Heidenhain's conversational language, which is not read here; have the part's program written for"
+    " LinuxCNC: L X+10 R0 F200 is G1 X10 F200 here"
+)
+_NO_LABEL = (
+    "the O word that this word of a branch, a loop or a subroutine belongs to is missing; write it before, as O1 ENDIF"
+    " for O1 IF"
+)
+_PRINTED = "DPRNT, BPRNT, POPEN and PCLOS print on Fanuc's controls; write (PRINT, ...)"
+# Of lines that cannot be read, without blanks and in lower case: what they are the language of, in order.
+_LANGUAGES = tuple(
+    (re.compile(pattern), said)
+    for pattern, said in (
+        (
+            r"[0-9]*(?:(?:begin|end)pgm|tool(?:call|def)|cycl(?:call|def)|call(?:lbl|pgm)|blkform|[lc]{1,2}[xyz][-+])",
+            _HEIDENHAIN,
+        ),
+        (
+            r"(?:n[0-9]+)?(?:a?(?:trans|rot|scale|mirror)(?:$|[;xyzr])|cycle[0-9]+\(|mcall|msg\(|r[0-9]+="
+            r"|def(?:real|int|bool|string)|goto[bfc]|(?:pocket|slot|holes)[0-9]\(|if[r$])|[^(;<#]*[a-z]{2}=",
+            _SIEMENS,
+        ),
+        (r"(?:n[0-9]+)?(?:[bd]prnt\[|popen$|pclos$)", _PRINTED),
+        (
+            r"(?:n[0-9]+)?(?:else(?:$|[(;]|if\[)|end(?:if|while|repeat|sub)|(?:sub|return|break|continue|call)(?:$|[(;\[])"
+            r"|repeat\[)",
+            _NO_LABEL,
+        ),
+        (r"(?:n[0-9]+)?(?:if\[|while\[|goto|do[0-9]|end[0-9])", FANUC_MACRO),
+    )
 )
 OLD_LINE_ENDS = "its lines end with CR alone, so that they are one; save the file with line ends LF, or CR LF"
 
@@ -99,10 +136,24 @@ FANUC_CONTOUR = (
 _FANUC_CYCLE = re.compile(r"g7[0-3](?![0-9])")
 
 
+def other_language(line: str) -> str | None:
+    """What to say of a line, without blanks and in lower case, that is of another control's language; None: of none."""
+    return next((said for pattern, said in _LANGUAGES if pattern.match(line)), None)
+
+
+_CORNER = re.compile(r",[rca][-+0-9.#\[]")
+
+
 def no_such_letter(letter: str, line: str = "") -> str:
     """Why no word can begin with this character, on this line in lower case."""
     if letter in "uw" and _FANUC_CYCLE.search(line):
         return f"{letter.upper()} {FANUC_CONTOUR}"
+    if letter == "," and _CORNER.search(line):
+        return ",R and ,C round and break corners on other controls; write the arc, or the line, of the corner itself"
+    if letter in "+-*/" and line.startswith("#"):
+        return "an expression stands in brackets; write for example #1 = [#1 + 1]"
+    if letter == ":" and line[1:2].isdigit():
+        return f"a program's number begins with O here; write O{line[1:]}"
     if letter >= "\x80":
         return "only letters, digits and signs of ASCII make words; remove it or put it into a comment ( )"
     return _LETTERS.get(letter, f"no word begins with {letter!r}; words are a letter and a number, comments ( ) or ;")

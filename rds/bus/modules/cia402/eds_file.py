@@ -130,6 +130,8 @@ def _section(values: Mapping[str, str | None]) -> Section:
     found.setdefault("ParameterName", "no name")
     for key in _NUMBERS:
         text = _line(values.get(key.lower()))
+        if key == "DefaultValue":  # a DCF has what the drive was set to besides
+            text = _line(values.get("parametervalue")) or text
         kind = int(found.get("DataType", "0"), 0)
         if key in ("DefaultValue", "LowLimit", "HighLimit") and (kind in _TEXTS or kind in _REALS):
             if text:
