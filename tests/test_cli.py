@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import queue
 import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -254,22 +257,45 @@ def test_a_served_machine_ends_by_ctrl_c(folder: Path) -> None:
 
     served = subprocess.Popen(
         [sys.executable, "-m", "rds.cli.main", "machine", "serve", "mini-cnc"],
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    assert served.stderr is not None
+    assert served.stderr is not None and served.stdin is not None
     try:
         assert "Ctrl-C ends" in served.stderr.readline()
         (folder / "e.toml").write_text(SIMULATION.replace("duration = 2.0", "duration = 0.2"))
         done = command("run", "e.toml", "-m", "implementation", "-o", "out", "--json")
         assert only_json(done.stdout)["mode"] == "implementation"
+        served.stdin.write("2 emergency on\n")  # a hand at the button of X
+        served.stdin.flush()
+        assert any("emergency stop" in line for line in iter(served.stderr.readline, ""))
         served.send_signal(signal.SIGINT)
         _, errors = served.communicate(timeout=60)
     finally:
         served.kill()
     assert "Traceback" not in errors
     assert served.returncode in (0, 130)
+
+
+def test_hands_are_heard_again_when_a_server_comes_to_the_front(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the background of a terminal a read is an error (EIO), and is no end of the lines."""
+    from rds.bus.modules import server_program
+
+    said: list[Any] = [OSError(errno.EIO, "in the background"), b"2 emergency on\n2 em", b"ergency off\n", b""]
+
+    def read(descriptor: int, size: int) -> bytes:
+        word = said.pop(0)
+        if isinstance(word, OSError):
+            raise word
+        return bytes(word)
+
+    monkeypatch.setattr(server_program.os, "read", read)
+    monkeypatch.setattr(server_program, "_BACKGROUND", 0.0)
+    lines, ended = queue.SimpleQueue[str](), threading.Event()
+    server_program._read_stdin(lines, ended)
+    assert [lines.get(), lines.get()] == ["2 emergency on", "2 emergency off"] and ended.is_set()
 
 
 def test_help_is_quick() -> None:

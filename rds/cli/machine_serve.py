@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 from pathlib import Path
 from typing import Annotated
 
@@ -61,9 +62,14 @@ def serve(
         Path | None, typer.Option(help="What the machine cuts (TOML): its load cell measures the force (dialect rds).")
     ] = None,
 ) -> None:
-    """Run the machine's axis modules as CAN nodes, or as units on a serial line (--dialect dcs), until Ctrl-C."""
+    """Run the machine's axis modules as CAN nodes, or as units on a serial line (--dialect dcs), until Ctrl-C.
+
+    Lines on stdin are hands at the machine: 2 emergency on, 2 emergency off.
+    """
     with refusals():
+        from rds.bus.hub.bus_settings import SERIAL
         from rds.bus.modules.dialects import DEFAULT, check_served_with, interface_of, serve_machine
+        from rds.bus.modules.server_program import hear_hands
         from rds.bus.tools.link import BUILTIN, bus_name, bus_options, default_channel
         from rds.machines import load_machine
 
@@ -92,4 +98,7 @@ def serve(
             from rds.bus.medium.fault_file import read_faults
 
             options["faults"] = read_faults(faults)
+        if where in (BUILTIN, SERIAL, "socketcan"):  # others would be asked for frames every 2 ms, to look for lines
+            options["lines"] = queue.SimpleQueue[str]()
+            hear_hands(options["lines"])
         serve_machine(machine, spoken, where, place, ready, axes=names, **options)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -319,7 +318,9 @@ def folder_for(out: Path | None, force: bool) -> Path:
     if out is None:
         if force:
             raise _refused("--force replaces what is in the folder of --out, which is not given")
-        return next(path for k in count(1) if not (path := Path(f"step-{k}")).exists())
+        from rds.results.files import new_folder
+
+        return new_folder(".", "step")
     if not force and out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise _refused(f"{out}: something is there already; choose another folder, or replace it with --force")
     return out

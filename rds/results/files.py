@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -55,6 +56,11 @@ def save_all(result: Result, directory: str | Path) -> dict[str, Path]:
     for suffix in _FORMATS.keys() - set(_usable()):  # an earlier run's, which would be opened in place of this one
         (directory / f"{_STEM}{suffix}").unlink(missing_ok=True)
     return {path.suffix.removeprefix("."): path for path in writers}
+
+
+def new_folder(parent: str | Path, stem: str) -> Path:
+    """The first of `stem`-1, `stem`-2, ... in `parent` that is not there; it is not made yet."""
+    return next(path for k in count(1) if not (path := Path(parent) / f"{stem}-{k}").exists())
 
 
 def saved_files(directory: str | Path) -> dict[str, Path]:

@@ -248,6 +248,23 @@ def test_homing_from_on_the_switch(bench: Benches, homed: bool) -> None:
     assert rig.module.plant.counts / 169.0 == pytest.approx(rig.module.plant.true_position, abs=0.02)
 
 
+@pytest.mark.parametrize("before", [True, False])
+def test_a_wire_that_breaks_is_not_taken_for_the_zero(bench: Benches, before: bool) -> None:
+    """The axis leaves the switch, and it stays open: 5 % of the travel on, it is the wire."""
+    rig = bench("X", start=-100.0)
+    rig.move(Move.HOME)
+    rig.run(1.0)
+    rig.module.set_wire(-1, False, rig.now)
+    if before:  # broken when it begins: the axis believes to stand on the switch
+        rig.until_done()
+        rig.heard.clear()
+        rig.move(Move.HOME)
+    assert rig.until_done() == Result.STOPPED_BY_LIMIT
+    plant = rig.module.plant
+    assert not rig.module.mover.homed and plant.true_position < -100.0 + 35.0
+    assert plant.counts / 169.0 == pytest.approx(plant.true_position, abs=0.02)
+
+
 def test_homing_without_switches_sets_the_zero_here(bench: Benches) -> None:
     rig = bench("A", start=30.0)
     rig.move(Move.HOME)

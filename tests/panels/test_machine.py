@@ -61,6 +61,7 @@ def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_pag
     page.select_option('.widget-dropdown:visible:has-text("Module") select', "4: LinrXa")
     press(page, "Step")
     page.wait_for_selector(".rds-figure canvas:visible, .rds-figure img:visible")
+    page.wait_for_selector(':text("recorded in step-1"):visible')
     tab(page, "Bus")
     page.wait_for_selector("td:visible:has-text('Reply')")
     page.click('button:text-is("Dark")')

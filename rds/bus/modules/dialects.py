@@ -9,7 +9,8 @@ nothing moves; where axes are commanded by other things than voltages, `commands
 server takes of `rds machine serve` beside the options of a bus, `SERVED_WITH`. It is read for runs that need no bus, so
 it imports what needs python-can in its functions.
 
-`server` has `serve(machine, interface, channel, axes, ready, stop, **options)` and is a program (`server_program.py`).
+`server` has `serve(machine, interface, channel, axes, ready, stop, lines, **options)`, and is a program
+(`server_program.py`).
 """
 
 from __future__ import annotations

@@ -7,11 +7,14 @@ SIGHUP; with --exit-with-stdin also when its starter has gone and nobody command
 from __future__ import annotations
 
 import argparse
+import errno
 import logging
 import os
 import queue
+import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -20,6 +23,8 @@ from rds.bus.modules.serve_loop import AFTERLIFE
 from rds.bus.tools.link import BUILTIN, bus_name, default_channel, pair
 from rds.core.errors import InputError, RdsError
 from rds.machines import load_machine
+
+_BACKGROUND = 0.5  # s until a program in the background of its terminal looks for lines again
 
 
 def run(
@@ -52,8 +57,7 @@ def run(
     logging.getLogger("canopen").setLevel(logging.WARNING)  # it reports every SDO transfer
     orphaned = threading.Event()
     if options.exit_with_stdin or lines is not None:
-        reader = partial(_read_stdin, lines, orphaned if options.exit_with_stdin else threading.Event())
-        threading.Thread(target=reader, name="starter", daemon=True).start()
+        hear_hands(lines, orphaned if options.exit_with_stdin else None)
     axes = options.axes.split(",") if options.axes else None
     try:
         machine = load_machine(options.machine)
@@ -81,12 +85,34 @@ def _say(line: str) -> None:
     sys.stdout.flush()
 
 
-def _read_stdin(lines: queue.SimpleQueue[str] | None, ended: threading.Event) -> None:
-    """Hand on lines, and set `ended` at their end. A thread in a read costs nothing until then, on every system."""
+def hear_hands(lines: queue.SimpleQueue[str] | None, ended: threading.Event | None = None) -> None:
+    """From now on hand the lines on stdin on to `lines`, and set `ended` at their end.
+
+    A program in the background of a terminal goes on (else reading would stop it), and hears lines when it is in front.
+    """
+    if sys.stdin is None:  # closed from the start: its descriptor may be a bus's by now
+        return
+    if hasattr(signal, "SIGTTIN") and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTTIN, signal.SIG_IGN)
+    threading.Thread(target=_read_stdin, args=(lines, ended), name="starter", daemon=True).start()
+
+
+def _read_stdin(lines: queue.SimpleQueue[str] | None, ended: threading.Event | None) -> None:
+    """A thread in a read costs nothing until a line comes, on every system."""
     rest = b""
-    while data := os.read(0, 4096):  # not sys.stdin: a thread in its lock would spoil the interpreter's end
+    while True:
+        try:
+            data = os.read(0, 4096)  # not sys.stdin: a thread in its lock would spoil the interpreter's end
+        except OSError as error:
+            if error.errno != errno.EIO:
+                break
+            time.sleep(_BACKGROUND)
+            continue
+        if not data:
+            break
         *whole, rest = (rest + data).split(b"\n")
         if lines is not None:
             for line in whole:
                 lines.put(line.decode(errors="replace"))
-    ended.set()
+    if ended is not None:
+        ended.set()

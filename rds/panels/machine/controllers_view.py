@@ -126,7 +126,10 @@ class ControllersView:
         name = result.axes[0]
         notes = "\n".join(map(str, result.meta.get("notes") or ()))
         measured = quality(result, name).words(result.units[f"{name}_measured"])
-        self.notice.say(f"{notes or 'the axis reached the point'}\n{measured}", "warning" if notes else "good")
+        said = [notes or "the axis reached the point", measured]
+        if self.state.kept is not None:
+            said.append(f"recorded in {self.state.kept.name}")
+        self.notice.say("\n".join(said), "warning" if notes else "good")
 
     def _chosen(self, change: Any) -> None:
         if change["new"] is not None:

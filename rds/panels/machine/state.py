@@ -33,7 +33,8 @@ class MachineState:
     """What can be done with the modules on the bus of a session. Everything that takes time gives a Task.
 
     `rows` are what the last scan found, `data` what modules said of themselves, by number (as `Information.as_dict`),
-    `response` the last recorded step. The simulated machine that it starts ends with it, or with its process.
+    `response` the last recorded step, `kept` the folder of its tables. The simulated machine that it starts ends with
+    it, or with its process.
     """
 
     def __init__(self, session: Session):
@@ -53,6 +54,7 @@ class MachineState:
         self.rows: list[dict[str, Any]] = []
         self.data: dict[int, dict[str, Any]] = {}
         self.response: Result | None = None
+        self.kept: Path | None = None
         self._responded = 0  # the module whose response that is
         self._server: subprocess.Popen[bytes] | None = None
         self._task: Task[Any] | None = None
@@ -204,7 +206,10 @@ class MachineState:
         return self._work(f"tuning of module {number}", act)
 
     def step(self, number: int) -> Task[Result]:
-        """Step the module's set point and record the response, until it stands. It can be stopped, which stops it."""
+        """Step the module's set point, record the response until it stands, and keep it in a new folder, step-1...
+
+        It can be stopped, which stops it.
+        """
         if self._data(number)["kind"] == "tool":
             raise InputError(f"module {number} is a tool: it has a speed and no position to step")
         by, period, settled = (self.choices[name] for name in ("step", "period", "settled"))
@@ -218,6 +223,10 @@ class MachineState:
                     progress=lambda done, of: task.advance(abs(done), abs(of), f"the axis has gone {done} counts"),
                 )
             self._responded = number
+            from rds.results.files import new_folder, save_all
+
+            self.kept = new_folder(self.session.folder, "step")
+            save_all(self.response, self.kept)
             return self.response
 
         return self._work(f"step of module {number}", act)

@@ -39,6 +39,7 @@ def serve(
     axes: Sequence[str] | None = None,
     ready: Callable[[], Any] | None = None,
     stop: threading.Event | None = None,
+    lines: queue.SimpleQueue[str] | None = None,
     quirks: str | Iterable[str] = (),
     eds: str | Path | None = None,
     **options: Any,
@@ -46,7 +47,7 @@ def serve(
     """Serve a drive for each axis of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`.
 
     `quirks` are things that are wrong with the drives, as in "wrong-sign,zero-limits" (see quirks.py). With `eds`, the
-    EDS of another drive, they have its objects and identity.
+    EDS of another drive, they have its objects and identity. `lines` press buttons (`press_buttons`).
 
     A drive's node-ID is its axis's node, its full voltage the converter's range. It counts as commanded while SYNC
     comes.
@@ -54,7 +55,11 @@ def serve(
     file = None if eds is None else Path(eds)
     make_drive = partial(_make_drive, volts=machine.converter.range, quirks=read_quirks(quirks), eds=file)
     make_node = partial(_make_node, make_drive)
-    serve_nodes(machine, make_node, interface, channel, axes, ready, stop, **options)
+    serve_nodes(
+        *(machine, make_node, interface, channel, axes, ready, stop),
+        chores=None if lines is None else partial(press_buttons, lines),
+        **options,
+    )
 
 
 def _make_node(make_drive: Callable[..., Drive], slot: int, axis: Axis, opener: Opener) -> DriveNode:
@@ -70,7 +75,7 @@ def _make_drive(
 def main(arguments: Sequence[str] | None = None) -> int:
     """The program. Exit code 0: told to end; 1: the bus failed at the start; 2: bad input."""
     lines = queue.SimpleQueue[str]()
-    with_buttons = partial(serve, chores=partial(press_buttons, lines))
+    with_buttons = partial(serve, lines=lines)
     return server_program.run(with_buttons, "rds.bus.modules.cia402.server", "serve simulated drives", arguments, lines)
 
 

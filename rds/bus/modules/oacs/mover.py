@@ -18,6 +18,7 @@ STALL = 3.0  # s without a count until the motion is given up
 STILL = 0.1  # s without a count until the axis counts as standing
 HOST_SILENCE = 2.0  # s without a word of the host until the motion ends
 HOMING_DUTY = 200.0
+LEAVES = 0.05  # of the travel: off a limit switch within this way, or its wire is broken
 LONGEST_JOG = 60.0  # s
 _TOOL_STILL = 0.5  # rev/min
 _AT_START = pid.Memory()
@@ -41,6 +42,9 @@ class Motion:
     result: Result = Result.CARRIED_OUT  # once it settles
     settling: bool = False
     trips: int = 0  # of the limit switches, at its beginning
+    found: bool = False  # of a homing: the zero
+    turned: int = 0  # where a homing began to leave the switch, counts
+    shift: int = 0  # by how much it has moved the zero, counts
 
 
 class Mover:
@@ -150,6 +154,7 @@ class Mover:
             return Result.AT_LIMIT
         at = motion.since
         motion.last_count, motion.last_change, motion.next_sample, motion.trips = plant.counts, at, at, plant.trips
+        motion.turned = plant.counts
         self.motion = motion
         self.plant.awake = True
         if motion.mode != Mode.MOVING:
@@ -205,13 +210,20 @@ class Mover:
             self._settle(Result.STOPPED_BY_LIMIT if high.open else Result.STALLED, now)
         elif motion.direction < 0 and low.open:
             # where the edge was, not where the debouncing ended
-            plant.counter.set(plant.counts + round(low.position * plant.data.counts_per_unit) - low.mark)
-            self.homed = True
+            motion.shift = round(low.position * plant.data.counts_per_unit) - low.mark
+            plant.counter.set(plant.counts + motion.shift)
+            motion.found, motion.turned = True, plant.counts
             motion.direction = 1
             motion.last_change = now
             plant.drive(motion.duty, now)
-        elif motion.direction > 0 and not low.open:
-            if self.homed:
+        elif motion.direction > 0 and low.open:
+            way = LEAVES * (plant.data.highest - plant.data.lowest) * plant.data.counts_per_unit
+            if plant.counts - motion.turned > way:  # what opened was a wire: the zero is not here
+                plant.counter.set(plant.counts - motion.shift)
+                self._settle(Result.STOPPED_BY_LIMIT, now)
+        elif motion.direction > 0:
+            if motion.found:
+                self.homed = True
                 self._settle(Result.CARRIED_OUT, now)
             else:  # it stood on the switch at the start: now approach it
                 motion.direction = -1

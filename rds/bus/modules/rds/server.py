@@ -39,6 +39,7 @@ def serve(
     axes: Sequence[str] | None = None,
     ready: Callable[[], Any] | None = None,
     stop: threading.Event | None = None,
+    lines: queue.SimpleQueue[str] | None = None,
     drift: Any = (),
     trace: str | None = None,
     cut: str | None = None,
@@ -48,8 +49,8 @@ def serve(
 
     `drift` is how much too fast their clocks go, ppm by axis, as in "X:50,Y:-30", beside what the machine file says:
     what they tell, and by which they move in methods B and C. At the end the file `trace` (CSV) gets where the
-    carriages really were at each step of such a motion. `cut` is a file (`rds.machines.forces.cut_file`) of what the
-    machine cuts, for the load cell in its cutting head.
+    carriages really were at each step of such a motion. `lines` press buttons (`press_buttons`). `cut` is a file
+    (`rds.machines.forces.cut_file`) of what the machine cuts, for the load cell in its cutting head.
     """
     drifting = drift_by_axis(drift, machine)
     served: list[ModuleNode] = []
@@ -70,7 +71,11 @@ def serve(
             ready()
 
     try:
-        serve_nodes(machine, make_node, interface, channel, axes, begin, stop, **options)
+        serve_nodes(
+            *(machine, make_node, interface, channel, axes, begin, stop),
+            chores=None if lines is None else partial(press_buttons, lines),
+            **options,
+        )
     finally:
         if trace is not None:
             write_private(Path(trace), gauge_rows({node.name: node.module for node in served}).encode())
@@ -85,7 +90,7 @@ def gauge_rows(modules: Mapping[str, AxisModule]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The program. Exit code 0: told to end; 1: the bus failed at the start; 2: bad input."""
     lines = queue.SimpleQueue[str]()
-    with_buttons = partial(serve, chores=partial(press_buttons, lines))
+    with_buttons = partial(serve, lines=lines)
     return server_program.run(
         with_buttons, "rds.bus.modules.rds.server", "serve a machine's axis modules", arguments, lines
     )

@@ -20,7 +20,7 @@ TITLES = {
     "O34": "encoder counts of A after 345°, at half the resolution",
     "O35": "times of moves, s",
     "P36": "accelerometer: axes move, the drill turns",
-    "P37": "accelerometer: drilling 20 mm (the 11th reading did not survive the scan)",
+    "P37": "accelerometer: drilling 20 mm",
     "P38": "accelerometer: drilling 40 mm",
     "Q39": "current of A, A",
     "Q40": "current of X, A",
