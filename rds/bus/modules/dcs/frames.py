@@ -32,6 +32,7 @@ UNITS = range(1, 16)  # at most fifteen (section 3.6.2): the four switches of a 
 HIGHEST_VOLTAGE = 10.0  # V; sent as 10 V less one unit
 VOLTS_PER_UNIT = 20.0 / 65536.0
 NUMBERS = 4  # of frames
+FULL = 0.8  # of a period that a frame and its answers may take in a loop
 BITS_PER_BYTE = 10  # start bit, eight data bits, stop bit
 
 # First and last bytes are no CAN identifiers: nothing of this dialect can be said on a CAN bus.
