@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import pi
+from math import inf, nan, pi
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import pytest
 
 from rds.bus.modules import segments
 from rds.bus.modules.dcs import commands, dry_run, methods
+from rds.bus.modules.dcs.frames import Status
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 from rds.nc.run.serial_methods import METHODS, MethodRun, run_method
@@ -262,6 +263,20 @@ def test_on_a_line_of_much_noise_pieces_of_a_buffer_become_small(bench: Maker) -
     methods.method_c(b.host, np.ones((400, 1), np.int64), [2])
     b.port.sleep(b.port.now() + 0.1)
     assert b.position(2) == pytest.approx(4.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("wrong", [nan, inf, 1e30])
+@pytest.mark.parametrize("arc", [True, False])
+def test_equations_that_lead_nowhere_end_the_steps(bench: Maker, wrong: float, arc: bool) -> None:
+    """A host of one's own may send anything; the units of all other axes are in the same process."""
+    b = bench(baud=115_200)
+    straight = segments.line(0.0, 5.0, 5)
+    data = straight.pack() + straight._replace(arc=arc, a=wrong, b=wrong, own=5.0).pack() + straight.pack()
+    assert b.host.data(2, commands.SEGMENT, 0, data).step == len(data)
+    b.host.go()
+    b.port.sleep(b.port.now() + 0.5)
+    assert b.host.inquire(2).status & Status.EMPTY
+    assert b.position(2) == pytest.approx(0.05) or arc  # an angle of any size is one
 
 
 def test_a_go_that_nobody_heard_is_said_again_and_one_that_some_heard_is_told(bench: Maker) -> None:

@@ -18,7 +18,7 @@ The angle is sent, not its cosine: a float32 of that would be 3 BLU wrong after 
 
 from __future__ import annotations
 
-from math import atan2, cos, sin
+from math import atan2, cos, isfinite, sin
 from struct import Struct
 from typing import NamedTuple
 
@@ -49,9 +49,9 @@ class NodeSegment(NamedTuple):
 
 
 def unpack(data: bytes | bytearray) -> NodeSegment:
-    """The segment in its bytes."""
+    """The segment in its bytes, whatever they are: an angle that is no number leads to places that are none."""
     steps, arc, sign, each, own, other, centre = _SEGMENT.unpack(data)
-    a, b = (cos(each), sin(each)) if arc else (each, 0.0)
+    a, b = (cos(each), sin(each)) if arc and isfinite(each) else (each, 0.0)
     return NodeSegment(steps, bool(arc), sign, a, b, own, other, centre)
 
 

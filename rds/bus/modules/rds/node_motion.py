@@ -199,7 +199,7 @@ class NodeMotion:
             self._equations = Equations(segments.unpack(self._segments.popleft()))
             self._held -= segments.SIZE
         target = self._equations.next()
-        if self._equations.left == 0:
+        if self._equations.left <= 0:
             self._equations = None
         return target
 
