@@ -7,7 +7,7 @@ bit of the info byte asks for answers, and another adds a checksum; with neither
 | -------- | --------------------------------------------------------------------------------------------- |
 | 0        | info: 1, 1, checksum follows, answers wanted, mode (2 bits), number of the frame (2 bits)     |
 | 1 to 12  | six commands of two bytes, little-endian, in the order of the machine's axes; set-up: uint32  |
-|          | period in µs, uint32 session, 4 bytes 0                                                       |
+|          | period in µs (0: 10 ms), uint32 session, 4 bytes 0                                            |
 | 13       | CRC-8 of bytes 0 to 12, if the info byte says so                                              |
 
 The thesis prints no values of the info byte: these are ours, above all first bytes of the other protocol

@@ -334,7 +334,7 @@ class Unit:
         counts, status = self.counts(at), self.status
         self._watchdog = False
         if info.mode is Mode.SETUP:
-            self._period, _ = frames.decode_setup(body)
+            self._period = frames.decode_setup(body)[0] or BYTE_TIME
             self._halt(at)
             self._is_set_up = True
         elif info.mode is Mode.CALL or not self._is_set_up:
