@@ -120,7 +120,8 @@ def encode_data(command: int, unit: int, index: int, data: bytes) -> bytes:
 
 def is_whole(data: bytes | bytearray) -> bool:
     """Whether a piece of data has come as it was sent."""
-    return crc_hqx(data[: -_CHECKSUM.size], 0) == _CHECKSUM.unpack(data[-_CHECKSUM.size :])[0]
+    body, checksum = data[: -_CHECKSUM.size], data[-_CHECKSUM.size :]
+    return _CHECKSUM.pack(crc_hqx(body, 0)) == checksum
 
 
 def data_size(count: int) -> int:

@@ -69,7 +69,8 @@ class Program:
     def step(self) -> int | None:
         """The BLU of the step that is due; None if there is none. What was not sent of a whole BLU is carried."""
         if not self.filled:
-            return self._end()
+            self._end()
+            return None
         self.due += self._step_time
         self.index += 1
         if self._bytes:
@@ -80,7 +81,8 @@ class Program:
             self._equations = segments.Equations(self._segments.popleft())
         place = self._equations.next()
         if not abs(place) < _FARTHEST:
-            return self._end()
+            self._end()
+            return None
         target = round(place)
         if self._equations.left <= 0:
             self._equations = None
