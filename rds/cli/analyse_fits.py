@@ -53,9 +53,13 @@ def show_serial(
 
     title = f"{machine.name}: {count} units, a period of {T * 1e3:g} ms"
     show_table(title, serial_line.COLUMNS, [[cell(value) for value in row] for row in rows])
+    verdict = f"it does not fit; it misses {-asked.left * 1e3:.2f} ms"
+    if asked.left >= 0.0:
+        verdict = f"it fits, and leaves {asked.left * 1e3:.2f} ms"
+        if not asked.fits:
+            verdict = f"a loop, which may take {asked.share:.0%} of the period, does not fit"
     typer.echo(
-        f"At {rate} bit/s a cycle with answers takes {asked.time * 1e3:.2f} ms: it "
-        f"{'fits, and leaves' if asked.fits else 'does not fit; it misses'} {abs(asked.left) * 1e3:.2f} ms. "
+        f"At {rate} bit/s a cycle with answers takes {asked.time * 1e3:.2f} ms: {verdict}. "
         f"Filling the buffers of the thesis stops the motion for {rest:.2f} s."
     )
     if plot is not None:

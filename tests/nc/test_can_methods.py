@@ -94,8 +94,8 @@ def test_drift_is_a_key_of_the_machine_file(tmp_path: Path) -> None:
 def test_a_segment_survives_its_frames() -> None:
     arc = segments.arc(20_000.0, 0.0, 0.0, 2 * np.pi, 6000, first=True)
     data = b"".join(motion_frames.pieces_of_segments([arc]))
-    assert len(data) == motion_frames.SEGMENT_SIZE
-    equations = segments.Equations(motion_frames.unpack_segment(data))
+    assert len(data) == segments.SIZE
+    equations = segments.Equations(segments.unpack(data))
     places = [equations.next() for _ in range(arc.steps)]
     assert places[-1] == pytest.approx(20_000.0, abs=1e-3)  # counts, after a whole circle
     report = Progress(70_000, 300, 12, MotionStatus.READY)

@@ -36,6 +36,20 @@ def test_fifteen_units_fit_where_the_baud_rate_is_high() -> None:
         serial_line.fits(16, 38_400, 0.01)
 
 
+def test_what_fits_is_what_a_run_takes(tmp_path: Path) -> None:
+    """A loop takes 80 % of its period at most, method A a whole step."""
+    runner, dcs = CliRunner(), ["bus", "analyse", "starmill", "--dialect", "dcs", "--baud"]
+    told = runner.invoke(app, [*dcs, "38400", "--period", "0.0145"])  # 11.94 ms are 82 %
+    assert told.exit_code == 1 and "a loop, which may take 80% of the period, does not fit." in told.output
+    assert runner.invoke(app, [*dcs, "38400", "--period", "0.015"]).exit_code == 0
+    assert [serial_line.most_units(1, 38_400, period) for period in (0.0145, 0.015)] == [3, 4]
+    part = tmp_path / "part.ngc"
+    part.write_text("G21 G90 F600\nG1 X1\nM2\n")
+    told = runner.invoke(app, ["nc", "run", str(part), "--machine", "starmill", "--method", "A", "--baud", "38400"])
+    assert told.exit_code == 2
+    assert "method A and its answers take 11.94 ms at 38400 bit/s, more than a step of 10 ms" in told.output
+
+
 def test_the_command_says_what_fits(tmp_path: Path) -> None:
     runner = CliRunner()
     picture = tmp_path / "load.png"

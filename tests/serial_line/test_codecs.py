@@ -111,6 +111,17 @@ def test_fillings_are_1500_bytes_each() -> None:
     assert [len(each) for each in buffers.fillings(bytes(3001))] == [1500] * 3
 
 
+def test_two_wrong_bits_in_a_piece_of_data_are_seen_wherever_they_are() -> None:
+    """A CRC-8 sees none that are 127 bits apart."""
+    whole = commands.encode_data(commands.DATA, 2, 400, bytes(range(200)))
+    assert commands.is_whole(whole) and len(whole) == commands.data_size(200)
+    for apart in (1, 7, 127, 254, 1500):
+        damaged = bytearray(whole)
+        for bit in (60, 60 + apart):
+            damaged[bit // 8] ^= 0x80 >> bit % 8
+        assert not commands.is_whole(damaged), apart
+
+
 def test_noise_makes_no_answers_that_nobody_sent() -> None:
     """Of the bytes of 20,000 answers one in a hundred has a turned bit: what comes through was sent."""
     random = np.random.default_rng(5)

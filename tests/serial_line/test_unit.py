@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from rds.bus.modules.dcs import commands
-from rds.bus.modules.dcs.frames import Status
+from rds.bus.modules.dcs import commands, frames
+from rds.bus.modules.dcs.frames import Info, Mode, Status
 from rds.core.errors import MachineError
 
 from .conftest import Bench
@@ -33,6 +33,14 @@ def test_three_axes_carry_their_buffers_out_together(bench: Maker) -> None:
     assert b.port.now() - begun == pytest.approx(1500 * (0.01 + 2 * 10 / 38_400), rel=0.01)
     assert [b.host.inquire(unit).counts for unit in (2, 3, 4)] == [3000, -1500, 700]
     assert [b.position(unit) for unit in (2, 3, 4)] == pytest.approx([30.0, -15.0, 7.0], abs=1e-2)
+
+
+def test_a_set_up_without_a_period_means_that_of_the_firmware(bench: Maker) -> None:
+    b = bench()
+    b.port.write(frames.encode(Info(Mode.SETUP), frames.setup_body(0.0, 1)))
+    b.port.write(frames.encode(Info(Mode.INCREMENTS), frames.words([5])))
+    b.port.sleep(b.port.now() + 0.1)
+    assert b.position(2) == pytest.approx(0.05)
 
 
 def test_data_for_another_unit_are_no_commands(bench: Maker) -> None:

@@ -23,7 +23,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rds.bus.medium.bits import longest, shortest
-from rds.bus.modules.rds.motion_frames import BUFFER, PIECE, SEGMENT_SIZE, SLOTS
+from rds.bus.modules.rds.motion_frames import BUFFER, PIECE, SLOTS
+from rds.bus.modules.segments import SIZE as SEGMENT_SIZE
 from rds.core.errors import InputError
 
 if TYPE_CHECKING:

@@ -8,16 +8,21 @@ dcs-thesis, equations 3.1 to 3.4, of a point (x, y) about the centre of its arc,
 
 Each node gets the equations of its own coordinate and, of an arc, those of the other one, for it cannot do without.
 With cos Δθ ≅ 1 (equation 6.10) the radius would grow by a factor of √(1 + Δθ²) in each step; exact coefficients cost
-nothing here. A segment takes 24 bytes whatever its length.
+nothing here. A segment takes 24 bytes whatever its length:
+
+    uint16 steps, uint8 1 for an arc, int8 sign, float64 BLU of a step or, of an arc, its angle (rad), float32 own
+    start, other start from the centre, centre
+
+The angle is sent, not its cosine: a float32 of that would be 3 BLU wrong after a circle of 40 mm in steps of 10 ms.
 """
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import atan2, cos, isfinite, sin
 from struct import Struct
 from typing import NamedTuple
 
-_SEGMENT = Struct("<HBBfffff")
+_SEGMENT = Struct("<HBbdfff")
 SIZE = _SEGMENT.size
 
 
@@ -39,13 +44,15 @@ class NodeSegment(NamedTuple):
 
     def pack(self) -> bytes:
         """The bytes of the segment."""
-        return _SEGMENT.pack(self.steps, self.arc, self.sign & 0xFF, self.a, self.b, self.own, self.other, self.centre)
+        each = atan2(self.b, self.a) if self.arc else self.a
+        return _SEGMENT.pack(self.steps, self.arc, self.sign, each, self.own, self.other, self.centre)
 
 
-def unpack(data: bytes) -> NodeSegment:
-    """The segment in its bytes."""
-    steps, arc, sign, a, b, own, other, centre = _SEGMENT.unpack(data)
-    return NodeSegment(steps, bool(arc), sign - 256 if sign > 127 else sign, a, b, own, other, centre)
+def unpack(data: bytes | bytearray) -> NodeSegment:
+    """The segment in its bytes, whatever they are: an angle that is no number leads to places that are none."""
+    steps, arc, sign, each, own, other, centre = _SEGMENT.unpack(data)
+    a, b = (cos(each), sin(each)) if arc and isfinite(each) else (each, 0.0)
+    return NodeSegment(steps, bool(arc), sign, a, b, own, other, centre)
 
 
 def line(start: float, end: float, steps: int) -> NodeSegment:

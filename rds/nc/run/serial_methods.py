@@ -27,6 +27,7 @@ from rds.bus.modules.dcs import methods as on_line
 from rds.bus.modules.dcs.buffers import bytes_of
 from rds.bus.modules.dcs.build import make_line
 from rds.bus.modules.dcs.commands import MOST_STEPS
+from rds.bus.modules.dcs.drivers import exchange_time
 from rds.bus.modules.dcs.host import Host
 from rds.bus.modules.dcs.port import SerialPort, VirtualPort, is_device
 from rds.core.errors import InputError
@@ -91,6 +92,11 @@ def run_method(
     InputError for a method that the mode has not; MachineError if a unit or the line fails.
     """
     check_method(method, mode)
+    if method == "A" and (time := exchange_time(baud, len(machine.axes))) > motion.period:
+        raise InputError(
+            f"a frame of method A and its answers take {time * 1e3:.2f} ms at {baud:g} bit/s, more than a step of "
+            f"{motion.period * 1e3:g} ms: raise the baud rate, or take B or C (`rds bus analyse` tells what fits)"
+        )
     titles = {axis.node: f"{axis.name} (unit {axis.node})" for axis in machine.axes.values()}
     if mode == SIMULATION:
         if channel is not None:

@@ -33,7 +33,6 @@ SILENT_AFTER = 10  # periods without an answer; then all axes get zero volts
 LOST_AFTER = 0.3  # s without an answer, and SILENT_AFTER periods at least: the run ends
 _SET_UPS = 3  # a frame may be damaged, and a unit that has the set-up of an earlier host does not tell
 _STARTING = 1.0  # s for all units to answer at the start
-_MARGIN = 0.8  # of a period that a frame and its answers may take
 
 
 @dataclass
@@ -120,10 +119,10 @@ class DcsDrivers(drivers_base.DriversBase[_Unit, Answer]):
     @staticmethod
     def _check_time(baud: float, period: float, units: int, checksum: bool) -> None:
         time = exchange_time(baud, units, checksum)
-        if time > _MARGIN * period:
+        if time > frames.FULL * period:
             raise InputError(
                 f"a frame and the answers of {units} units take {time * 1e3:.2f} ms at {baud:g} bit/s, more than "
-                f"{_MARGIN:.0%} of the sample period of {period * 1e3:g} ms: raise [bus] baud or the sample period "
+                f"{frames.FULL:.0%} of the sample period of {period * 1e3:g} ms: raise [bus] baud or the sample period "
                 "(`rds bus analyse` tells what fits)"
             )
 

@@ -7,7 +7,7 @@ bit of the info byte asks for answers, and another adds a checksum; with neither
 | -------- | --------------------------------------------------------------------------------------------- |
 | 0        | info: 1, 1, checksum follows, answers wanted, mode (2 bits), number of the frame (2 bits)     |
 | 1 to 12  | six commands of two bytes, little-endian, in the order of the machine's axes; set-up: uint32  |
-|          | period in µs, uint32 session, 4 bytes 0                                                       |
+|          | period in µs (0: 10 ms), uint32 session, 4 bytes 0                                            |
 | 13       | CRC-8 of bytes 0 to 12, if the info byte says so                                              |
 
 The thesis prints no values of the info byte: these are ours, above all first bytes of the other protocol
@@ -32,6 +32,7 @@ UNITS = range(1, 16)  # at most fifteen (section 3.6.2): the four switches of a 
 HIGHEST_VOLTAGE = 10.0  # V; sent as 10 V less one unit
 VOLTS_PER_UNIT = 20.0 / 65536.0
 NUMBERS = 4  # of frames
+FULL = 0.8  # of a period that a frame and its answers may take in a loop
 BITS_PER_BYTE = 10  # start bit, eight data bits, stop bit
 
 # First and last bytes are no CAN identifiers: nothing of this dialect can be said on a CAN bus.

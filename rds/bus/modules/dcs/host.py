@@ -61,7 +61,7 @@ class Host:
             answer = self._answer(unit, size, self.port.now() + time)
             if answer is not None:
                 return answer
-        raise NoAnswer(f"no answer from {self.title(unit)} on line {self._name} to {what}; {self._help()}")
+        raise NoAnswer(f"no answer from {self.title(unit)} on line {self._name} to {what}; {self.help}")
 
     def _answer(self, unit: int, size: int, deadline: float) -> bytes | None:
         uid = commands.uid(unit)
@@ -85,7 +85,9 @@ class Host:
         while self.port.read(0.0):
             pass
 
-    def _help(self) -> str:
+    @property
+    def help(self) -> str:
+        """What to look at where the line or a unit does not work."""
         return "check power, cable, baud rate and the unit's switches"
 
     # --- verbs
@@ -135,7 +137,7 @@ class Host:
                 return
             self.counters.damaged += 1
             self.port.sleep(self.port.now() + _SILENCE)
-        raise MachineError(f"{self.title(unit)} on line {self._name} did not take its buffer; {self._help()}")
+        raise MachineError(f"{self.title(unit)} on line {self._name} did not take its buffer; {self.help}")
 
     def step_through(self, master: int, progress: Callable[[int], None] | None = None) -> None:
         """Execute: carry out the buffers of all units byte by byte, each step asked for when the master has made one.
@@ -156,7 +158,7 @@ class Host:
                     self.stop_all(hold=True)
                     raise MachineError(
                         f"no answer from {self.title(master)}, the master of the steps, on line {self._name} "
-                        f"(step {k + 1}, {uid}); {self._help()}"
+                        f"(step {k + 1}, {uid}); {self.help}"
                     )
             else:
                 lost = 0

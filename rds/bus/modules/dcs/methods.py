@@ -22,7 +22,7 @@ from rds.bus.modules.dcs.answers import AnswerStream
 from rds.bus.modules.dcs.buffers import bytes_of, fillings
 from rds.bus.modules.dcs.commands import BUFFER, BYTE_TIME, Report
 from rds.bus.modules.dcs.frames import Info, Mode, Status
-from rds.bus.modules.dcs.host import Host
+from rds.bus.modules.dcs.host import TRIES, Host, NoAnswer
 from rds.bus.modules.segments import NodeSegment
 from rds.core.errors import MachineError
 
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     import numpy as np
 
 _PIECE = 200  # bytes of data at once; 8 segments of 24
+_LEAST = 25  # bytes of data at once on a line with so much noise that no larger piece comes through
+_PIECES_LOST = 3  # of the least size, one after the other, that may be lost, each with all tries
 LOOK = 0.1  # s between two looks at each unit
 _CLOCK = 1.0  # s between two corrections of the units' clocks
 _WRAP = 1 << 16
@@ -146,13 +148,26 @@ class Feed:
         self.unit, self.data, self.sent, self._ends = unit, data, 0, ends
         self.step = 0
         self.command = commands.DATA if ends is None else commands.SEGMENT
-        self._piece = _PIECE if ends is None else _PIECE // segments.SIZE * segments.SIZE
+        self._most, self._lost = _PIECE, 0
+        self.doubtful: set[int] = set()  # bytes of pieces that may have been taken, though no answer said so
 
     def next_piece(self) -> bytes:
         """What is sent next; nothing where all is sent, or where the unit's buffer has no room for it."""
-        piece = self.data[self.sent : self.sent + self._piece]
+        most = self._most if self._ends is None else self._most // segments.SIZE * segments.SIZE
+        piece = self.data[self.sent : self.sent + most]
         carried_out = self.step if self._ends is None else bisect_right(self._ends, self.step) * segments.SIZE
         return piece if self.sent + len(piece) - carried_out <= BUFFER else b""
+
+    def lose(self, size: int) -> bool:
+        """A piece of this size had no answer: the next ones are smaller; whether it is worth while to send one."""
+        self.doubtful.add(size)
+        self._lost = self._lost + 1 if self._most == _LEAST else 0
+        self._most = max(self._most // 2, _LEAST)
+        return self._lost < _PIECES_LOST
+
+    def answered(self) -> None:
+        """The unit has said what it took."""
+        self.doubtful, self._lost = set(), 0
 
     def take(self, report: Report) -> bool:
         """Note how far the unit is; whether that can be, for none goes back."""
@@ -184,7 +199,7 @@ def cyclic(
         for feed in feeds:
             while send(host, feed):
                 pass
-        begun = host.go()
+        begun = _go(host, feeds)
         course = Course(begun, begun + steps * BYTE_TIME, steps)
         clock = begun + _CLOCK
         while True:
@@ -203,18 +218,41 @@ def cyclic(
     return course
 
 
+def _go(host: Host, feeds: Sequence[Feed]) -> float:
+    """Say go until it is heard; the instant at which the units begin. MachineError where some have not begun."""
+    for _ in range(TRIES):
+        begun = host.go()
+        waiting = [feed.unit for feed in feeds if _waits(host.inquire(feed.unit))]
+        if not waiting:
+            return begun
+        if len(waiting) < len(feeds):
+            break
+        host.counters.retries += 1
+    raise MachineError(f"{', '.join(map(host.title, waiting))} did not begin; {host.help}")
+
+
+def _waits(report: Report) -> bool:
+    return bool(report.status & Status.FILLED) and not report.status & Status.EXECUTING and report.step == 0
+
+
 def send(host: Host, feed: Feed) -> bool:
     """One more piece; whether it was taken, and there is more."""
     part = feed.next_piece()
     if not part:
         return False
-    report = host.data(feed.unit, feed.command, feed.sent, part)
-    taken = report.step == (feed.sent + len(part)) % _WRAP
-    if taken:
-        feed.sent += len(part)
-    elif report.step != feed.sent % _WRAP:
+    try:
+        report = host.data(feed.unit, feed.command, feed.sent, part)
+    except NoAnswer:
+        host.inquire(feed.unit)  # it is the line, not the unit: of smaller pieces fewer are damaged
+        if not feed.lose(len(part)):
+            raise
+        return True
+    taken = (report.step - feed.sent) % _WRAP
+    if taken not in {0, len(part), *feed.doubtful}:
         raise _reset(host, feed.unit)
-    return taken and feed.sent < len(feed.data)
+    feed.sent += taken
+    feed.answered()
+    return taken > 0 and feed.sent < len(feed.data)
 
 
 def _look_after(host: Host, feed: Feed, steps: int) -> bool:

@@ -14,6 +14,7 @@ from rds.bus.modules import segments
 from rds.bus.modules.dcs.commands import BUFFER, steps_of
 
 _WRAP = 1 << 16
+_FARTHEST = 1 << 31  # BLU that a position has at most; equations that lead beyond it, or to no number, end the steps
 _SLEW = 0.5e-3  # s by which one message corrects a clock at most: the host's own lateness must not jerk the axes
 
 
@@ -68,7 +69,7 @@ class Program:
     def step(self) -> int | None:
         """The BLU of the step that is due; None if there is none. What was not sent of a whole BLU is carried."""
         if not self.filled:
-            self.runs, self.due, self.ran_empty = False, inf, True
+            self._end()
             return None
         self.due += self._step_time
         self.index += 1
@@ -78,11 +79,21 @@ class Program:
             return count
         if self._equations is None:
             self._equations = segments.Equations(self._segments.popleft())
-        target = round(self._equations.next())
-        if self._equations.left == 0:
+        place = self._equations.next()
+        if not abs(place) < _FARTHEST:
+            self._end()
+            return None
+        target = round(place)
+        if self._equations.left <= 0:
             self._equations = None
         count, self._at = target - self._at, target
         return count
+
+    def _end(self) -> None:
+        self._bytes.clear()
+        self._segments.clear()
+        self._equations = None
+        self.runs, self.due, self.ran_empty = False, inf, True
 
     def correct(self, low: int, at: float) -> None:
         """The host's clock says that the step whose number ends in these eight bits begins at the instant `at`."""

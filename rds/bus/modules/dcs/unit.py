@@ -236,7 +236,7 @@ class Unit:
             self.heard += 1
             return self._frame(*found, at)
         if first in (commands.DATA, commands.SEGMENT):
-            if frames.crc8(whole[:-1]) != whole[-1]:
+            if not commands.is_whole(whole):
                 return None
             return self._data(first, second, whole, at)
         if self._jog and first != commands.INQUIRY:
@@ -323,8 +323,8 @@ class Unit:
         self.heard += 1
         if not self.program.runs and not self.program.filled:
             self.program.begin(self.counts(at))
-        index, _ = commands.DATA_HEAD.unpack_from(whole, 2)
-        data = whole[2 + commands.DATA_HEAD.size : -1]
+        index, count = commands.DATA_HEAD.unpack_from(whole, 2)
+        data = whole[2 + commands.DATA_HEAD.size :][:count]
         wanted = self.program.take(command == commands.SEGMENT, index, data)
         return [(at + TURN_ROUND, self.report(at, wanted))]
 
@@ -334,7 +334,7 @@ class Unit:
         counts, status = self.counts(at), self.status
         self._watchdog = False
         if info.mode is Mode.SETUP:
-            self._period, _ = frames.decode_setup(body)
+            self._period = frames.decode_setup(body)[0] or BYTE_TIME
             self._halt(at)
             self._is_set_up = True
         elif info.mode is Mode.CALL or not self._is_set_up:

@@ -15,16 +15,13 @@ Positions and increments are in sixteenths of an encoder count, so that a slow f
 between. A set point of method A is the low 16 bits of the position, so that a lost frame leaves nothing behind.
 
 What a buffer holds is said when it begins: increments (method C; an int16 for each sample period, three in a piece), or
-segments (method B; 24 bytes, four pieces): uint16 steps, uint8 1 for an arc, int8 sign, float64 counts of a step or, of
-an arc, its angle (rad), float32 own start, other start from the centre, centre, all in counts (segments.py). The angle
-is sent, not its cosine: a float32 of that would be 7 µm wrong after a circle of 20 mm in steps of 1 ms.
+segments (method B; 24 bytes, four pieces), as segments.py packs them, in counts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import IntEnum, IntFlag
-from math import atan2, cos, sin
 from struct import Struct
 from typing import NamedTuple
 
@@ -37,7 +34,6 @@ FINE = 16  # parts of an encoder count
 SLOTS = 4  # set points in a frame of method A
 PIECE = 6  # bytes of a buffer in one frame of data
 BUFFER = 1500  # bytes, as in dcs-thesis; 0.75 s of increments each 1 ms
-SEGMENT_SIZE = 24
 WRAP = 1 << 16
 MOST_INCREMENT = (WRAP // 2 - 1) / FINE  # counts in one step
 
@@ -45,7 +41,6 @@ _SETPOINTS = Struct(f"<{SLOTS}H")
 _BEGIN = Struct("<BBBBi")
 _GAIN = Struct("<BBBBf")
 _PROGRESS = Struct("<HHHBB")
-_SEGMENT = Struct("<HBbdfff")
 _RATE = 256e6  # a rate is sent in 1/256 ppm, three bytes
 _OFFSET = 1e7  # an offset in 0.1 µs, three bytes
 _THREE = 1 << 23
@@ -161,19 +156,6 @@ def decode_progress(data: bytes | bytearray) -> Progress:
     return Progress(step, wanted, free, MotionStatus(status))
 
 
-def pack_segment(segment: NodeSegment) -> bytes:
-    """The 24 bytes of a segment of method B."""
-    each = atan2(segment.b, segment.a) if segment.arc else segment.a
-    return _SEGMENT.pack(segment.steps, segment.arc, segment.sign, each, segment.own, segment.other, segment.centre)
-
-
-def unpack_segment(data: bytes | bytearray) -> NodeSegment:
-    """The segment in its bytes."""
-    steps, arc, sign, each, own, other, centre = _SEGMENT.unpack(data)
-    a, b = (cos(each), sin(each)) if arc else (each, 0.0)
-    return NodeSegment(steps, bool(arc), sign, a, b, own, other, centre)
-
-
 def increments(data: bytes | bytearray) -> list[float]:
     """The increments in a piece, counts."""
     return [int.from_bytes(data[i : i + 2], "little", signed=True) / FINE for i in range(0, len(data) - 1, 2)]
@@ -187,5 +169,5 @@ def pieces_of_increments(fine: Sequence[int]) -> list[bytes]:
 
 def pieces_of_segments(segments: Sequence[NodeSegment]) -> list[bytes]:
     """The pieces that carry these segments."""
-    data = b"".join(map(pack_segment, segments))
+    data = b"".join(segment.pack() for segment in segments)
     return [data[i : i + PIECE] for i in range(0, len(data), PIECE)]

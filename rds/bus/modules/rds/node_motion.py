@@ -22,6 +22,7 @@ import logging
 from collections import deque
 from math import inf
 
+from rds.bus.modules import segments
 from rds.bus.modules.rds import motion_frames as codes
 from rds.bus.modules.rds.motion_frames import Buffer, MotionStatus, Progress, Verb
 from rds.bus.modules.segments import Equations
@@ -129,9 +130,9 @@ class NodeMotion:
             self._steps.extend(codes.increments(piece))
             return
         self._data += piece
-        while len(self._data) >= codes.SEGMENT_SIZE:
-            self._segments.append(bytes(self._data[: codes.SEGMENT_SIZE]))
-            del self._data[: codes.SEGMENT_SIZE]
+        while len(self._data) >= segments.SIZE:
+            self._segments.append(bytes(self._data[: segments.SIZE]))
+            del self._data[: segments.SIZE]
 
     def setpoint(self, data: bytes | bytearray, slot: int, at: float) -> None:
         """A set point of method A, for the end of the period that begins now."""
@@ -195,10 +196,10 @@ class NodeMotion:
         if self._equations is None:
             if not self._segments:
                 return None
-            self._equations = Equations(codes.unpack_segment(self._segments.popleft()))
-            self._held -= codes.SEGMENT_SIZE
+            self._equations = Equations(segments.unpack(self._segments.popleft()))
+            self._held -= segments.SIZE
         target = self._equations.next()
-        if self._equations.left == 0:
+        if self._equations.left <= 0:
             self._equations = None
         return target
 
