@@ -1,12 +1,14 @@
 // A panel without a mouse. Ctrl+Enter presses its Run, Escape its Stop, which ends the run and is no emergency stop; of a
 // run whose Stop is not in sight yet it is pressed as soon as it is. What folds away is opened by Enter or space. The list
 // of panels is one stop of Tab, within which arrows move. Labels belong to their fields, and what is said in a notice is
-// read out. And a panel begins at its top, however far the one before was scrolled.
+// read out. A panel begins at its top, however far the one before was scrolled. And JupyterLab, whose cells are deleted and
+// run by keys, hears none that is meant for a panel: dd on a button would delete the cell that shows it.
 
 const HEADER = ".jupyter-widget-Collapse-header";
 const RUN = "button.rds-run", STOP = ".rds-work button";
 const STEPS = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 };
 const LOOK = 50; // ms
+const NOT_OF_LAB = "data-lm-suppress-shortcuts";
 const set = (element, name, value) => { if (element.getAttribute(name) !== value) element.setAttribute(name, value); };
 let count = 0;
 
@@ -59,6 +61,10 @@ function render({ el }) {
     }
   };
   const press = (which) => [...app.querySelectorAll(which)].find((each) => each.offsetParent && !each.disabled);
+  const keep = (event) => { // but for Ctrl+S and the like; what has the focus says so itself
+    const { target, key } = event;
+    if (app.contains(target)) target.toggleAttribute(NOT_OF_LAB, !(event.ctrlKey || event.metaKey) || key === "Enter");
+  };
   const pressed = (event) => {
     if (!(event.target instanceof Element) || event.defaultPrevented) return;
     if (event.target.matches(HEADER) && (event.key === "Enter" || event.key === " ") && !event.ctrlKey) {
@@ -92,6 +98,7 @@ function render({ el }) {
     label();
     seen.observe(app, { childList: true, subtree: true, attributes: true, attributeFilter: ["class"] });
     app.addEventListener("keydown", pressed, true); // before the fields, which let no key out of them
+    window.addEventListener("keydown", keep, true);
     window.addEventListener("click", clicked, true); // before presence.js, which holds some back
   });
   return () => {
@@ -99,6 +106,7 @@ function render({ el }) {
     clearTimeout(due);
     clearInterval(watch);
     seen.disconnect();
+    window.removeEventListener("keydown", keep, true);
     window.removeEventListener("click", clicked, true);
     if (app) app.removeEventListener("keydown", pressed, true);
   };
