@@ -73,6 +73,11 @@ def test_the_keyboard_runs_and_stops_and_what_comes_of_it_is_read_out(
     page.wait_for_selector('.rds-notice[aria-live=polite] [role=status]:has-text("done: 250 samples"):visible')
     page.get_by_label("Mode", exact=True).select_option(label="Emulation")
     page.get_by_label("Final time").fill("600")
+    for _ in range(2):  # the first one waits for what was typed, the second one is on its way
+        page.keyboard.press("Control+Enter")
+        page.keyboard.press("Escape")  # before there is a Stop
+        page.wait_for_timeout(500)
+        page.wait_for_selector(".rds-work:visible", state="hidden")
     page.keyboard.press("Control+Enter")
     page.wait_for_selector('[aria-live=polite] :text("the run begins"):visible')
     page.wait_for_selector('.rds-work:has-text("running"):visible')  # there are samples of this run

@@ -79,6 +79,13 @@ def test_a_notebook_cell_shows_the_panels_and_tracks_a_sine(
     page.wait_for_selector(".rds-app .rds-figure canvas:visible")
     page.wait_for_selector('.rds-app :text("Saved with its report in")')
     assert len(list((folder / "runs").iterdir())) == 1
+    page.focus('.rds-app button:text-is("Dark")')
+    page.keyboard.press("Enter")  # the button's, and not the notebook's
+    page.wait_for_selector(".rds-app.rds-dark")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".rds-app:not(.rds-dark)")
+    page.keyboard.type("dd")  # which deletes a cell that is selected
+    assert page.locator('.jp-CodeCell .cm-content:has-text("rds.panels.main()")').count() == 1
     sockets = [path for path in runtime.glob("jupyter/kernel-*") if path.is_socket()]
     assert len(sockets) == 5 and (runtime / "jupyter").stat().st_mode & 0o077 == 0  # nobody else connects to them
     # the emergency stop stays in sight while one scrolls, and nothing lies over it: not the tools of the figure either

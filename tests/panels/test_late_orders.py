@@ -12,7 +12,10 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.modes import mode_names
+from rds.panels.equipment.result_actions import ResultActions
 from rds.panels.grading.panel import GradingView
+from rds.panels.interpolator.panel import InterpolatorView
+from rds.panels.interpolator.state import Interpolating
 from rds.panels.jog.hold import HoldButtons
 from rds.panels.jog.panel import JogView
 from rds.panels.jog.state import Jog
@@ -245,6 +248,10 @@ def test_nothing_is_kept_or_sent_of_a_value_that_was_refused_and_stands_in_its_f
     review, state = GradingView(shell), MachineState(shell.session)
     tuning, bus = ControllersView(shell, state), BusView(shell, state)
     touch_off = SetupView(Program(shell.session), dict)
+    results, interpolator = ResultActions(shell), InterpolatorView(shell, Interpolating(shell.session))
+    results._result = interpolator.done = object()  # type: ignore[assignment]
+    results._folder = tmp_path
+    saved, sent = (interpolator._save_views[name] for name in ("file", "send_to"))
     for field, act in (
         (review._words["points"], review.review),
         (tuning._tuning[1], tuning.tune),
@@ -252,9 +259,13 @@ def test_nothing_is_kept_or_sent_of_a_value_that_was_refused_and_stands_in_its_f
         (bus._fields[0], bus.analyse),
         (bus._filter, bus.listen),
         (touch_off._views[1], touch_off._touch_off),
+        (results._views["save_as"], lambda: results._save("before.csv")),
+        (results._views["send_to"], lambda: results._send("before@example.edu")),
+        (sent, interpolator.send),
+        (saved, interpolator.save),
     ):
         field.control.value = "8 of 10"
-        if field is bus._filter:
+        if field in (bus._filter, results._views["save_as"], saved):
             field.control.value = "x" * 9999
         with pytest.raises(InputError, match=f"first mend what is refused: {field.field.label}"):
             act()

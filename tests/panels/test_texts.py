@@ -12,10 +12,13 @@ from typing import Any
 import ipywidgets as widgets
 import pytest
 
+from rds.checks import check_controller, clauses
 from rds.controllers import controller_names
 from rds.machines import load_machine, machine_names
 from rds.machines.library import library
+from rds.panels.code.advice import told
 from rds.panels.code.completions import words as completions
+from rds.panels.equipment.build import Mark, _words
 from rds.panels.equipment.fields import first_fields, parameter_fields, signal_fields
 from rds.panels.interpolator.fields import Rows
 from rds.panels.kit.field import FieldView
@@ -190,3 +193,32 @@ def test_the_page_is_in_the_language_that_is_chosen_and_back_again(
     page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
     page.wait_for_selector('button:visible:text-is("Run")')
     assert page.get_attribute("html", "lang") == "en"
+
+
+@pytest.mark.parametrize("code", languages())
+def test_what_a_check_finds_in_a_students_file_is_in_the_language(code: str) -> None:
+    find = exchanger(code)
+    assert all(find(each) for name, each in vars(clauses).items() if name.isupper())
+
+    def forgets(t: Any, r: Any, y: Any, state: Any, params: Any) -> Any:
+        pass
+
+    def fails(t: Any, r: Any, y: Any, state: Any, params: Any) -> Any:
+        return params["Kp"] * (r.position - y), state
+
+    def has_no_number(t: Any, r: Any, y: Any, state: Any, params: Any) -> Any:
+        return float("nan"), state
+
+    def takes_too_few(t: Any, r: Any) -> Any:
+        return 0.0, ()
+
+    for bad in (forgets, fails, has_no_number, takes_too_few):
+        for fault in check_controller(bad).faults:
+            said = _words(fault)
+            shown, named = find(said), find(f"law.py, line 3: {said}")
+            assert shown is not None and shown != said and "rule:" not in shown, said
+            assert named is not None and named.endswith(shown), named
+            text = 'def control(t, r, y, state, params):\n    return params["Kp"] * (r.position - y), state\n'
+            below = told(Mark(2, said), text, ["Kd"]).text  # in the editor
+            assert find(below) not in (None, below), below
+    assert find("law.py: 2 faults: line 3, line 7") not in (None, "law.py: 2 faults: line 3, line 7")

@@ -11,7 +11,7 @@ import ipywidgets as widgets
 
 from rds.core.errors import InputError
 from rds.panels.kit.button import button, follow, say_error
-from rds.panels.kit.field import FieldView
+from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
@@ -52,6 +52,7 @@ class ResultActions:
         self.where = Html()
         self.bar = WorkBar(shell.ticker)
         self.notice = Notice()
+        self._views: dict[str, FieldView] = {}
         self._rows = self._made()
         self.widget = widgets.VBox([self.where, self._rows, self.bar, self.notice])
         self.clear()
@@ -120,7 +121,8 @@ class ResultActions:
             ("save_as", button("Save", saved, lambda: self._save(str(choices["save_as"])), self.notice)),
             ("send_to", button("Send", sent, lambda: self._send(str(choices["send_to"])), self.notice)),
         ):
-            action = widgets.HBox([FieldView(choices, name), press])
+            self._views[name] = FieldView(choices, name)
+            action = widgets.HBox([self._views[name], press])
             action.add_class("rds-action")
             actions.append(action)
         return row(*actions)
@@ -128,6 +130,7 @@ class ResultActions:
     def _save(self, name: str) -> None:
         if (result := self._result) is None:
             return
+        check_mended([self._views["save_as"]])
 
         def work(_: Task[str]) -> str:
             return f"saved as {save_as(result, self._session.folder, name)}"
@@ -137,6 +140,7 @@ class ResultActions:
     def _send(self, to: str) -> None:
         if self._folder is None:
             return
+        check_mended([self._views["send_to"]])
         files = [path for name in self._sent if (path := self._folder / name).is_file()]
         if not files:
             raise InputError(f"nothing is there to send: {', '.join(self._sent)} are gone from {self._folder}")

@@ -22,7 +22,7 @@ from rds.panels.interpolator.segment_table import SegmentTable
 from rds.panels.interpolator.state import Interpolating
 from rds.panels.kit.button import button, follow, runs
 from rds.panels.kit.diagram import diagram_svg
-from rds.panels.kit.field import FieldView
+from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
@@ -96,6 +96,7 @@ class InterpolatorView:
             options=[("Motion", "motion")], tooltips=["which picture is shown"], tooltip=""
         )
         self.picture.observe(lambda change: self._draw(), "value")
+        self._save_views: dict[str, FieldView] = {}
         self._save_row = self._saving()
         self.scene = _scene(self.shell.session.machine)
         moving = widgets.Box([] if self.scene is None else [self.scene])
@@ -127,7 +128,8 @@ class InterpolatorView:
             ("file", "Save", "The samples of all axes, as a table", self.save),
             ("send_to", "Send", "Send the table by e-mail; it is saved first", self.send),
         ):
-            action = widgets.HBox([FieldView(self.work.choices, name), button(text, tip, press, self.notice)])
+            self._save_views[name] = FieldView(self.work.choices, name)
+            action = widgets.HBox([self._save_views[name], button(text, tip, press, self.notice)])
             action.add_class("rds-action")
             actions.append(action)
         return row(*actions)
@@ -205,12 +207,14 @@ class InterpolatorView:
     def save(self) -> None:
         """What the save button does."""
         if self.done is not None:
+            check_mended([self._save_views["file"]])
             self.notice.say(f"saved as {self.work.save(self.done)}", "good")
 
     def send(self) -> None:
         """What the send button does."""
         done = self.done
         if done is not None:
+            check_mended(self._save_views.values())  # it is saved first
             follow(
                 self.bar, self.notice, lambda: self.work.send(done), lambda sentence: self.notice.say(sentence, "good")
             )

@@ -376,9 +376,8 @@ def _listen(jog: weakref.ref[Jog], loop: subprocess.Popen[str]) -> None:
         del mine
     loop.wait()
     if (mine := jog()) is not None and mine._loop is loop:  # it ended by itself
-        mine.moving, mine.homing = False, ""
         mine.error = mine.error or _ENDED
-        mine.session.give_machine_back(mine)
+        mine._let_go()  # the modules that were started for it end, too
 
 
 def _end_loop(loop: subprocess.Popen[str]) -> None:

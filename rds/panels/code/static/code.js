@@ -20,7 +20,7 @@ class Says extends CM.WidgetType {
   toDOM() {
     const made = document.createElement("div");
     made.className = `rds-code-says rds-code-${this.fault ? "fault" : "warning"}`;
-    made.textContent = `${this.fault ? "✖" : "⚠"} ${this.text}`;
+    made.textContent = `${this.fault ? "✖" : "⚠"} ${window.rdsText ? window.rdsText(this.text) : this.text}`;
     return made;
   }
   ignoreEvent() { return false; }

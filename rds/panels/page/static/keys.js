@@ -1,11 +1,14 @@
-// A panel without a mouse. Ctrl+Enter presses its Run, Escape its Stop, which ends the run and is no emergency stop. What
-// folds away is opened by Enter or space. The list of panels is one stop of Tab, within which arrows move. Labels belong
-// to their fields, and what is said in a notice is read out. And a panel begins at its top, however far the one before
-// was scrolled.
+// A panel without a mouse. Ctrl+Enter presses its Run, Escape its Stop, which ends the run and is no emergency stop; of a
+// run whose Stop is not in sight yet it is pressed as soon as it is. What folds away is opened by Enter or space. The list
+// of panels is one stop of Tab, within which arrows move. Labels belong to their fields, and what is said in a notice is
+// read out. A panel begins at its top, however far the one before was scrolled. And JupyterLab, whose cells are deleted and
+// run by keys, hears none that is meant for a panel: dd on a button would delete the cell that shows it.
 
 const HEADER = ".jupyter-widget-Collapse-header";
 const RUN = "button.rds-run", STOP = ".rds-work button";
 const STEPS = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 };
+const LOOK = 50; // ms
+const NOT_OF_LAB = "data-lm-suppress-shortcuts";
 const set = (element, name, value) => { if (element.getAttribute(name) !== value) element.setAttribute(name, value); };
 let count = 0;
 
@@ -42,7 +45,26 @@ function render({ el }) {
       set(each, "aria-label", "progress");
     }
   };
+  let pending = false, unwanted = false; // Run was pressed, and then Escape, before there was a Stop
+  const chosen = (button) => { pending = button?.matches(RUN) ?? false; unwanted = false; };
+  const clicked = (event) => { // by hand: those that others make of a press come later
+    if (event.isTrusted && event.target instanceof Element && app.contains(event.target)) chosen(event.target.closest("button"));
+  };
+  const stop = () => {
+    const button = press(STOP);
+    if (button) {
+      pending = unwanted = false;
+      button.click();
+    } else if (pending) {
+      if (!unwanted) document.dispatchEvent(new Event("rds-unwanted")); // what still waits is given up: presence.js
+      unwanted = true;
+    }
+  };
   const press = (which) => [...app.querySelectorAll(which)].find((each) => each.offsetParent && !each.disabled);
+  const keep = (event) => { // but for Ctrl+S and the like; what has the focus says so itself
+    const { target, key } = event;
+    if (app.contains(target)) target.toggleAttribute(NOT_OF_LAB, !(event.ctrlKey || event.metaKey) || key === "Enter");
+  };
   const pressed = (event) => {
     if (!(event.target instanceof Element) || event.defaultPrevented) return;
     if (event.target.matches(HEADER) && (event.key === "Enter" || event.key === " ") && !event.ctrlKey) {
@@ -54,15 +76,17 @@ function render({ el }) {
       event.preventDefault();
       at.blur(); // what was typed holds
       at.focus();
+      chosen(button);
       button.click();
     } else if (event.key === "Escape" && !event.target.closest(".cm-editor")) {
-      press(STOP)?.click();
+      stop();
     } else if (event.key in STEPS && event.target.matches(".rds-nav button")) {
       const all = [...app.querySelectorAll(".rds-nav button")];
       event.preventDefault();
       all[(all.indexOf(event.target) + STEPS[event.key] + all.length) % all.length].focus();
     }
   };
+  const watch = setInterval(() => { if (unwanted) stop(); else if (pending && press(STOP)) pending = false; }, LOOK);
   let due = 0;
   const seen = new MutationObserver((changes) => {
     due ||= setTimeout(() => { due = 0; label(); }, 50); // once for what comes together
@@ -74,11 +98,16 @@ function render({ el }) {
     label();
     seen.observe(app, { childList: true, subtree: true, attributes: true, attributeFilter: ["class"] });
     app.addEventListener("keydown", pressed, true); // before the fields, which let no key out of them
+    window.addEventListener("keydown", keep, true);
+    window.addEventListener("click", clicked, true); // before presence.js, which holds some back
   });
   return () => {
     cancelAnimationFrame(begun);
     clearTimeout(due);
+    clearInterval(watch);
     seen.disconnect();
+    window.removeEventListener("keydown", keep, true);
+    window.removeEventListener("click", clicked, true);
     if (app) app.removeEventListener("keydown", pressed, true);
   };
 }

@@ -30,14 +30,17 @@ function render({ model, el }) {
     return button && !button.matches(FIELDS) ? button : null;
   };
   const forget = (which) => { for (const [other, each] of waiting) if (which(each.button)) waiting.delete(other); };
+  const give_up = () => { // nothing that was pressed before may move the machine after what stops it
+    const orders = [...waiting.values()].map((each) => each.button).filter((each) => each.matches(MAY_ORDER));
+    forget((each) => orders.includes(each));
+    for (const each of orders) each.dispatchEvent(new Event("rds-given-up"));
+  };
   const touch = (event) => { if (pressed(event) === null) touched += 1; };
   const click = (event) => {
     const button = pressed(event);
     if (!button || button === through) return;
     if (button.matches(AT_ONCE)) {
-      const orders = [...waiting.values()].map((each) => each.button).filter((each) => each.matches(MAY_ORDER));
-      forget((each) => orders.includes(each)); // nothing that was pressed before may move the machine after it
-      for (const each of orders) each.dispatchEvent(new Event("rds-given-up"));
+      give_up();
       return;
     }
     if (touched === settled && waiting.size === 0 && !button.matches(ORDER)) return;
@@ -71,10 +74,12 @@ function render({ model, el }) {
   const touches = ["input", "change", "pointerup", "keyup", "click"];
   for (const name of touches) document.addEventListener(name, touch, true);
   document.addEventListener("click", click, true);
+  document.addEventListener("rds-unwanted", give_up); // Escape: keys.js
   model.on("msg:custom", answered);
   return () => {
     for (const name of touches) document.removeEventListener(name, touch, true);
     document.removeEventListener("click", click, true);
+    document.removeEventListener("rds-unwanted", give_up);
     model.off("msg:custom", answered);
   };
 }
