@@ -376,8 +376,9 @@ def _listen(jog: weakref.ref[Jog], loop: subprocess.Popen[str]) -> None:
         del mine
     loop.wait()
     if (mine := jog()) is not None and mine._loop is loop:  # it ended by itself
+        mine.moving, mine.homing = False, ""
         mine.error = mine.error or _ENDED
-        mine._let_go()  # the modules that were started for it end, too
+        mine.session.give_machine_back(mine)
 
 
 def _end_loop(loop: subprocess.Popen[str]) -> None:
