@@ -147,7 +147,8 @@ def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
         elif measure.told:
             yield Reason(Side.FOR, measure.kind, what)
         elif measure.kind == "gain":
-            yield Reason(Side.CANNOT_TELL, "gain-unidentifiable", f"this log does not tell the gain: {what}")
+            untold = f": {what}" if off.error < float("inf") else ""
+            yield Reason(Side.CANNOT_TELL, "gain-unidentifiable", f"this log does not tell the gain{untold}")
         else:
             yield Reason(
                 Side.NOTE, f"{measure.kind}-unidentifiable", f"this log does not tell the {measure.kind}: {what}"
