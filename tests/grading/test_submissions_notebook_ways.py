@@ -172,6 +172,7 @@ def test_what_cannot_be_followed_is_refused_in_words(cell: str, said: str) -> No
         "class Pid:\n    def __init__(self): self.i, self.k = 0.0, 0.0\n    def step(self, e):\n        self.i += e\n        return self.k * self.i\n    def share(self, e):\n        return self.k * e\npid = Pid()\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] + pid.step(y) + pid.share(y), state\nrds.Experiment(controller=pid.step).run()",
         "import numpy as np\nK = np.ones(2)\nold = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, params)[0] * K.max(), state\nplt.plot(K.argmax(), K.clip(0.0, 1.0), label=str(type(K)))",
         "log = []\nold = control\ndef control(t, r, y, state, params):\n    log.append(y)\n    return old(t, r, y, state, params)\ndef tried():\n    log.clear()\n    return rds.run(control)\ntried()",
+        "class Bench:\n    def cost(self, p):\n        return rds.run(params=p).rms\nb = Bench()\ncosts = list(map(b.cost, [params]))",
         'import math, no_such\nfor k in (1.0, 2.0):\n    params["Kp"] = k\n    no_such.plot(k)\nparams["Kp"] = math.fsum([30.0])',
         'import no_such\nfor k in (1.0, 2.0):\n    params["Kp"] = k\n    no_such.plot(k)\nparams["Kp"] = 30.0',
     ],

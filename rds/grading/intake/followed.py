@@ -379,8 +379,11 @@ def _of_body(function: ast.FunctionDef | ast.AsyncFunctionDef, inside: Known, al
     return inner or any(rank(each, inside) >= GIVES for each in handed)
 
 
-def with_methods(body: Sequence[ast.stmt], known: Known) -> Known:
-    """`known` with the classes of the notebook, and which of their methods may change what they are called on."""
+def with_methods(body: Sequence[ast.stmt], known: Known, absent: Set[str]) -> Known:
+    """`known` with the classes of the notebook, and which of their methods may change what they are called on.
+
+    What is `absent` there, as an experiment, spares what it is handed.
+    """
     classes = [each for each in body if isinstance(each, ast.ClassDef)]
     for each in classes:
         is_own = not (each.bases or each.keywords) and all(map(_is_own, each.body)) and not _reaches_class(each)
@@ -402,7 +405,9 @@ def with_methods(body: Sequence[ast.stmt], known: Known) -> Known:
             if _of_body(method, known.within(own, [method.args.args[0].arg]), also_handing_out=False):
                 changing.add(method.name)
             elif method.name not in stored | _METHODS:
-                spares = not _of_body(method, known.within(own, own), also_handing_out=False)
+                inside = known.within(own, own)
+                inside.absent = absent - own
+                spares = not _of_body(method, inside, also_handing_out=False)
                 reading[method.name] = spares and reading.get(method.name, True)
         known.reading = {name: spares for name, spares in reading.items() if name not in changing}
     return known
