@@ -223,6 +223,12 @@ def test_rows_that_note_something_of_each_signal_are_no_headings(tmp_path: Path)
     assert {name: column.unit for name, column in columns.items()} == {"time": None, "Axis:1": "mm", "cmd": "V"}
 
 
+def test_headings_of_one_axis_beside_a_nameless_index_are_names(tmp_path: Path) -> None:
+    """As pandas saves a table whose index has no name."""
+    (tmp_path / "a.csv").write_text(",X: pos [mm],X: cmd [V]\n" + "0.1,2,3\n0.2,3,4\n" * 3)
+    assert [*read_table(tmp_path / "a.csv").columns][1:] == ["X: pos", "X: cmd"]
+
+
 def test_a_first_row_with_another_separator_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("0.0e+000 1.2e+000\t\n" + "".join(f"{k}.0e-001\t1.2e+000\t\n" for k in range(1, 9)))
     (told,) = [f.what for f in read_table(tmp_path / "a.txt").findings if f.kind == "headings"]

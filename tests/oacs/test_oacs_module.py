@@ -248,6 +248,14 @@ def test_homing_from_on_the_switch(bench: Benches, homed: bool) -> None:
     assert rig.module.plant.counts / 169.0 == pytest.approx(rig.module.plant.true_position, abs=0.02)
 
 
+def test_an_axis_that_is_switched_on_beyond_its_switch_finds_the_zero(bench: Benches) -> None:
+    rig = bench("X", start=-155.0)
+    assert rig.module.plant.switches[0].open
+    rig.move(Move.HOME)
+    assert rig.until_done() == Result.CARRIED_OUT
+    assert rig.module.plant.counts / 169.0 == pytest.approx(rig.module.plant.true_position, abs=0.02)
+
+
 @pytest.mark.parametrize("before", [True, False])
 def test_a_wire_that_breaks_is_not_taken_for_the_zero(bench: Benches, before: bool) -> None:
     """The axis leaves the switch, and it stays open: 5 % of the travel on, it is the wire."""

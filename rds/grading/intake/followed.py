@@ -35,8 +35,10 @@ _PURE = frozenset({"numpy", "math", "cmath", "json", "statistics", "copy", "scip
 _CHANGING_OF_PURE = frozenset(
     {"fill", "copyto", "put", "put_along_axis", "place", "putmask", "shuffle", "fill_diagonal", "at"}
 )
-_OF_TWO = frozenset({"add", "subtract", "multiply", "divide", "true_divide", "power", "maximum", "minimum", "mod"})
-"""Functions of numpy that put the result into what is given after two arguments."""
+_ONE = ("sqrt", "square", "negative", "absolute", "abs", "fabs", "sign", "exp", "log", "sin", "cos", "floor", "ceil")
+_TWO = ("add", "subtract", "multiply", "divide", "true_divide", "power", "maximum", "minimum", "mod", "dot", "matmul")
+_TAKES = {**dict.fromkeys(_ONE, 1), **dict.fromkeys(_TWO, 2), "round": 2, "clip": 3, "cumsum": 3, "cumprod": 3}
+"""Arguments of numpy's functions that put the result into what is given after them."""
 _NAMESPACES = frozenset({"exec", "eval", "globals", "locals"})
 _BY_NAME = frozenset({"__init__", "__post_init__", "__new__", "__call__", "__setitem__", "__delitem__", "__setattr__"})
 """Methods of Python's own that are not called by operators, loops and `with`."""
@@ -203,10 +205,16 @@ def _of_call(node: ast.Call, known: Known) -> int:
     if base == CHANGES:
         return CHANGES
     last = node.func.attr if isinstance(node.func, ast.Attribute) else name
+    if any(word.arg == "out" and rank(word.value, known) == GIVES for word in node.keywords):
+        return CHANGES
+    if most == GIVES and any(_may_change(each, known) for each in given):
+        return CHANGES
     if base == GIVES and last in known.reading and (most < GIVES or known.reading[last]):
         return GIVES
     if base == GIVES and isinstance(node.func, ast.Attribute):
-        return CHANGES if last not in _READING else READS if last == "copy" else GIVES
+        if last not in _READING or (last != "get" and GIVES in ranks[1 : len(node.args)]):  # as clip(0, 1, result)
+            return CHANGES
+        return READS if last == "copy" else GIVES
     if base == GIVES and "__call__" in known.methods and name not in known.classes:
         return CHANGES
     within = known.classes.get(name)
@@ -217,13 +225,18 @@ def _of_call(node: ast.Call, known: Known) -> int:
     if name in known.functions:
         return CHANGES if name in known.changes_arguments else GIVES
     module = known.modules.get(root(node.func), "")
-    if last in _COPIES and all(isinstance(each, ast.Name) for each in given):
+    if (name or module) and last in _COPIES and all(isinstance(each, ast.Name) for each in given):
         return READS
-    if module in _PURE and last not in _CHANGING_OF_PURE and all(word.arg != "out" for word in node.keywords):
-        return CHANGES if last in _OF_TWO and len(node.args) > 2 else GIVES
+    if module in _PURE and last not in _CHANGING_OF_PURE:
+        return CHANGES if len(node.args) > _TAKES.get(last, len(node.args)) else GIVES
     if not module and name in _SCALAR:
         return READS
     return GIVES if not module and name in _GIVING | _COPIES else CHANGES
+
+
+def _may_change(node: ast.expr, known: Known) -> bool:
+    """Whether it is a method of the notebook that may change its arguments, handed to what calls it."""
+    return isinstance(node, ast.Attribute) and (node.attr in known.methods or known.reading.get(node.attr) is False)
 
 
 def _is_tried(node: ast.expr, known: Known) -> bool:
@@ -366,11 +379,14 @@ def _of_body(function: ast.FunctionDef | ast.AsyncFunctionDef, inside: Known, al
     return inner or any(rank(each, inside) >= GIVES for each in handed)
 
 
-def with_methods(body: Sequence[ast.stmt], known: Known) -> Known:
-    """`known` with the classes of the notebook, and which of their methods may change what they are called on."""
+def with_methods(body: Sequence[ast.stmt], known: Known, absent: Set[str]) -> Known:
+    """`known` with the classes of the notebook, and which of their methods may change what they are called on.
+
+    What is `absent` there, as an experiment, spares what it is handed.
+    """
     classes = [each for each in body if isinstance(each, ast.ClassDef)]
     for each in classes:
-        is_own = not (each.bases or each.keywords) and all(map(_is_own, each.body))
+        is_own = not (each.bases or each.keywords) and all(map(_is_own, each.body)) and not _reaches_class(each)
         known.classes = {**known.classes, each.name: names_in(each) if is_own else None}
     inner = chain.from_iterable(each.body for each in classes)
     methods = [each for each in inner if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef) and each.args.args]
@@ -389,10 +405,18 @@ def with_methods(body: Sequence[ast.stmt], known: Known) -> Known:
             if _of_body(method, known.within(own, [method.args.args[0].arg]), also_handing_out=False):
                 changing.add(method.name)
             elif method.name not in stored | _METHODS:
-                spares = not _of_body(method, known.within(own, own), also_handing_out=False)
+                inside = known.within(own, own)
+                inside.absent = absent - own
+                spares = not _of_body(method, inside, also_handing_out=False)
                 reading[method.name] = spares and reading.get(method.name, True)
         known.reading = {name: spares for name, spares in reading.items() if name not in changing}
     return known
+
+
+def _reaches_class(statement: ast.ClassDef) -> bool:
+    """Whether an object may change what it shares with all others: its class."""
+    attributes = {each.attr for each in ast.walk(statement) if isinstance(each, ast.Attribute)}
+    return bool(names_in(statement) & {"type", "classmethod", "__class__"} or "__class__" in attributes)
 
 
 def _is_own(statement: ast.stmt) -> bool:

@@ -125,7 +125,8 @@ def _follow(
         for each in body
         if isinstance(each, ast.Assign) and isinstance(each.value, ast.Name) and {*_set_by(each)} & makes.wanted
     }
-    seen = followed.with_methods(body, followed.Known(set(), set(), modules, functions, set(), handed))
+    seen = followed.Known(set(), set(), modules, functions, set(), handed)
+    seen = followed.with_methods(body, seen, absent[-1] if absent else set())
     while before != (before := len(keep) + len(seen.data) + len(seen.code) + len(seen.changes_arguments)):
         seen.data |= mutable(body, known, functions.keys()) - modules.keys() - functions.keys()
         for number, statement in enumerate(body):

@@ -54,6 +54,7 @@ _DUPLICATES = (0, 1, 2, 3, 1030)  # fcntl: duplicate, flags (F_SETFL is not here
 # mmap: private memory, or a file's; shared memory without a file would be in no sum once it is out of sight (madvise)
 _MAPPINGS = ((0x0F, 0x02), (0x2F, 0x01))  # mask of its flags, and what they must be under it
 _CHILD = 17  # SIGCHLD: who ignores it has children whose computing time the kernel adds to nobody's
+_SIGNAL_BITS = tuple(1 << k for k in range(7))  # of 1 to 64
 _NAMES_ITSELF = (15, 16)  # prctl: PR_SET_NAME, PR_GET_NAME
 
 
@@ -74,7 +75,8 @@ def submission_filter() -> bytes:
         calls.add_rule(seccomp.ALLOW, "ioctl", seccomp.Arg(1, seccomp.EQ, number))
     for number in _DUPLICATES:
         calls.add_rule(seccomp.ALLOW, "fcntl", seccomp.Arg(1, seccomp.EQ, number))
-    calls.add_rule(seccomp.ALLOW, "rt_sigaction", seccomp.Arg(0, seccomp.NE, _CHILD))
+    for bit in _SIGNAL_BITS:  # a bit that is not SIGCHLD's; the kernel looks at the lower half of what is given only
+        calls.add_rule(seccomp.ALLOW, "rt_sigaction", seccomp.Arg(0, seccomp.MASKED_EQ, bit, ~_CHILD & bit))
     for number in _NAMES_ITSELF:
         calls.add_rule(seccomp.ALLOW, "prctl", seccomp.Arg(0, seccomp.EQ, number))
     calls.add_rule(seccomp.ALLOW, "prlimit64", seccomp.Arg(0, seccomp.EQ, 0))  # its own; they can only go down

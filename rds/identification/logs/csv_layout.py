@@ -349,6 +349,8 @@ def _below_labels(lines: Sequence[str], first: int, delimiter: str, decimal: str
 def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
     """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
     noted = [_note(line, delimiter, width) for line in lines[:first]]
+    below_what = next((i for i in range(first) if len(split(lines[i], delimiter)) == width), first)
+    noted[: below_what + 1] = [None] * len(noted[: below_what + 1])  # the first of such rows has the names
     above = [line for line, note in zip(lines, noted, strict=False) if line.strip() and note is None][-2:]
     below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
     ended = bool(below) and all(cells[-1] == "" for cells in below)  # a delimiter ends each row, and perhaps no heading

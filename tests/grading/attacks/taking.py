@@ -85,7 +85,11 @@ assert libc.mlockall(3) == -1
 assert libc.mlock(b"x" * 4096, 4096) == -1
 """
 _SPIN_CHILDREN = """
-import signal
+import ctypes, platform, signal
+number = {"x86_64": 13, "aarch64": 134}[platform.machine()]
+ignore = (ctypes.c_ulong * 4)(1)
+for seventeen in (17, (1 << 32) + 17):  # the kernel looks at the lower half
+    assert ctypes.CDLL(None).syscall(number, ctypes.c_ulong(seventeen), ignore, None, ctypes.c_ulong(8)) == -1
 for handler in (signal.SIG_IGN, signal.SIG_DFL, lambda *a: None):
     try: signal.signal(signal.SIGCHLD, handler)
     except PermissionError: continue

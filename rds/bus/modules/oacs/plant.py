@@ -42,6 +42,9 @@ class Plant(MachineAxis):
         low = LimitSwitch(data.lowest - data.overtravel, -1, data.debounce)
         high = LimitSwitch(data.highest + data.overtravel, 1, data.debounce)
         self.switches: tuple[LimitSwitch, ...] = (low, high) if data.switches else ()
+        for switch in self.switches:  # it may stand on one, for longer than the debouncing takes
+            switch.look(data.start, start - data.debounce, count)
+        self._look(start)
 
     @property
     def true_position(self) -> float:
