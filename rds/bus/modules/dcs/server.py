@@ -199,7 +199,7 @@ def _serve(
         look = now + _LOOK
         if stop.is_set():
             return
-        while lines is not None and not lines.empty():
+        for _ in range(0 if lines is None else lines.qsize()):  # and no more: a flood of lines must not stop the line
             try:
                 handle(lines.get(), line, now)
             except InputError as error:
@@ -223,7 +223,7 @@ def handle(text: str, line: FieldLine, at: float) -> None:
             line.noise = NOISE.check(float(words[1]), "noise")
         except ValueError:
             raise InputError(f"noise {words[1]!r} must be a number from 0 to 1") from None
-    elif len(words) == 3 and words[0] == "unit" and words[2] in ("reset", "off") and words[1].isdigit():
+    elif len(words) == 3 and words[0] == "unit" and words[2] in ("reset", "off") and words[1].isdecimal():
         unit = line.unit(int(words[1]))
         if unit is None:
             numbers = ", ".join(str(each.number) for each in line.units)
