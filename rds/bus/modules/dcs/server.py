@@ -199,11 +199,8 @@ def _serve(
         look = now + _LOOK
         if stop.is_set():
             return
-        for _ in range(0 if lines is None else lines.qsize()):  # and no more: a flood of lines must not stop the line
-            try:
-                handle(lines.get(), line, now)
-            except InputError as error:
-                LOG.error("%s", error)
+        if lines is not None:
+            _do_lines(lines, line, now)
         if orphaned is not None and orphaned.is_set():
             count = sum(unit.heard for unit in line.units)
             if count != heard:
@@ -211,6 +208,14 @@ def _serve(
             elif now - since > afterlife:
                 LOG.warning("the starter has gone and nobody commands: end")
                 return
+
+
+def _do_lines(lines: queue.SimpleQueue[str], line: FieldLine, at: float) -> None:
+    for _ in range(lines.qsize()):  # and no more: a flood of lines must not stop the units
+        try:
+            handle(lines.get(), line, at)
+        except InputError as error:
+            LOG.error("%s", error)
 
 
 def handle(text: str, line: FieldLine, at: float) -> None:
