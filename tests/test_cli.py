@@ -298,6 +298,32 @@ def test_hands_are_heard_again_when_a_server_comes_to_the_front(monkeypatch: pyt
     assert [lines.get(), lines.get()] == ["2 emergency on", "2 emergency off"] and ended.is_set()
 
 
+def test_a_flood_of_lines_does_not_stop_a_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    from rds.bus.modules import buttons, server_program
+
+    said = [b"\0" * 4096] * 100 + [b"\n", b"yes\n" * 50 + b"2 emergency on", b""]  # the last line lacks its end
+    monkeypatch.setattr(server_program.os, "read", lambda *_: said.pop(0))
+    monkeypatch.setattr(server_program, "_FULL", 1e-3)
+    lines = queue.SimpleQueue[str]()
+    reader = threading.Thread(target=server_program._read_stdin, args=(lines, None), daemon=True)
+    reader.start()
+    heard: list[str] = []
+    while reader.is_alive() or not lines.empty():
+        assert lines.qsize() <= 20
+        if not lines.empty():
+            heard.append(lines.get())
+    assert len(heard[0]) <= 2 * 4096 and heard[1:] == ["yes"] * 50 + ["2 emergency on"]
+
+    class Endless(queue.SimpleQueue[str]):
+        def get(self, *_: Any) -> str:
+            self.put("yes")
+            return super().get()
+
+    endless = Endless()
+    endless.put("yes")
+    buttons.press_buttons(endless, [])  # it ends
+
+
 def test_help_is_quick() -> None:
     """Nothing heavy is imported for it."""
     done = subprocess.run(

@@ -9,6 +9,7 @@ from pathlib import Path
 from rds.nc.language.errors import ProgramError
 
 _COMMENT = re.compile(r"\([^)]*\)|;.*")
+_LONGEST = 1000  # characters of a line that are searched; one of more than 252 is a fault as a whole
 _VALUE = r"\s*(?:[-+]?\s*[\d.][\d.\s]*|[-+]?#\s*(?:<[^>]*>|\d+)|\[[^\]]*\])"
 
 
@@ -50,7 +51,7 @@ def _lines(file: str, wanted: set[int]) -> dict[int, str]:
     with open(file, encoding="utf-8-sig", errors="replace", newline="\n") as stream:
         for number, text in enumerate(stream, start=1):
             if number in wanted:
-                texts[number] = text
+                texts[number] = text[:_LONGEST]
             if number >= last:
                 break
     return texts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import hypot, inf, pi
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -35,6 +36,12 @@ def check(folder: Path, text: str, machine: str = "mini-cnc") -> Validation:
 
 def places(found: Validation) -> list[tuple[int, int, str]]:
     return [(fault.line, fault.column, fault.word) for fault in found.faults]
+
+
+def test_a_line_of_nothing_but_brackets_is_told_at_once(tmp_path: Path) -> None:
+    began = process_time()
+    (fault,) = check(tmp_path, "(" * 60_000 + "\nM2\n").faults
+    assert "longer than 252 characters" in fault.reason and process_time() - began < 2.0  # searched, it takes 5 s
 
 
 centres = st.floats(-40, 40)

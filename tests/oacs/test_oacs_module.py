@@ -273,6 +273,20 @@ def test_a_wire_that_breaks_is_not_taken_for_the_zero(bench: Benches, before: bo
     assert plant.counts / 169.0 == pytest.approx(plant.true_position, abs=0.02)
 
 
+def test_a_homing_that_is_stopped_while_it_leaves_the_switch_leaves_the_zero_alone(bench: Benches) -> None:
+    rig = bench("X", start=-100.0)
+    rig.move(Move.HOME)
+    rig.run(1.0)
+    rig.module.set_wire(-1, False, rig.now)  # the axis takes the wire for the switch, and begins to leave it
+    while rig.module.mover.motion is not None and not rig.module.mover.motion.found:
+        rig.run(0.01)
+    rig.module.mover.stop(Result.STOPPED_BY_EMERGENCY, rig.now)
+    assert rig.until_done() == Result.STOPPED_BY_EMERGENCY
+    plant = rig.module.plant
+    assert not rig.module.mover.homed and plant.true_position < -90.0
+    assert plant.counts / 169.0 == pytest.approx(plant.true_position, abs=0.02)
+
+
 def test_homing_without_switches_sets_the_zero_here(bench: Benches) -> None:
     rig = bench("A", start=30.0)
     rig.move(Move.HOME)

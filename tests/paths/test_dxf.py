@@ -133,6 +133,9 @@ def test_a_spline_of_fit_points_alone_is_a_smooth_curve_through_them_and_told(dr
     points = drawn(f"0 SPLINE 8 a 70 9 71 3 74 3 {fit}").curves[0].points
     first, last = points[1] - points[0], points[-1] - points[-2]
     assert np.dot(first, last) == pytest.approx(np.hypot(*first) * np.hypot(*last), rel=0.01)
+    for again in ("11 0 21 0", "11 1e-17 21 0", "11 0 21 1e-12"):  # the end said again, rounded
+        same = drawn(f"0 SPLINE 8 a 70 9 71 3 74 4 {fit} {again}").curves[0].points
+        assert same == pytest.approx(points, abs=1e-9)
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
@@ -181,6 +184,10 @@ def test_a_unit_that_parts_do_not_have_can_be_given(tmp_path: Path) -> None:
     [
         ("0 ARC 8 a 10 0 20 0 40 1e20 50 0 51 90", "an arc of radius 1e.20 mm takes more than 2000000 chords"),
         ("0 LINE 8 a 10 0 20 x", "group 20 of a DXF entity is 'x', not a number"),
+        (
+            "0 SPLINE 8 a 71 3 11 0 21 0 11 1e160 21 1 11 2 21 1e300",
+            "a spline goes through a place beyond 1e.12; save the drawing again",
+        ),
     ],
 )
 def test_what_is_refused_is_told_with_the_file(tmp_path: Path, entity: str, why: str) -> None:

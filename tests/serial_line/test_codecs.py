@@ -11,6 +11,8 @@ from rds.bus.modules.dcs import buffers, commands, frames
 from rds.bus.modules.dcs.answers import AnswerStream
 from rds.bus.modules.dcs.commands import Report
 from rds.bus.modules.dcs.frames import Answer, Info, Mode, Status
+from rds.bus.modules.dcs.line import FieldLine
+from rds.bus.modules.dcs.server import handle
 from rds.core.errors import InputError
 
 
@@ -142,3 +144,9 @@ def test_lost_bytes_cost_two_answers() -> None:
     stream = AnswerStream()
     stream.add(data[:10] + data[11:])
     assert list(iter(stream.next, None)) == [sent[0], *sent[3:]]
+
+
+@pytest.mark.parametrize("said", ["unit ² reset", "unit ٢ off", "\0�", "noise nan", "unit -1 off", ""])
+def test_what_no_hand_can_do_is_refused_and_ends_no_line(said: str) -> None:
+    with pytest.raises(InputError):
+        handle(said, FieldLine([], 9600.0), 0.0)

@@ -28,7 +28,7 @@ class HasButton(Protocol):
 def press_buttons(lines: queue.SimpleQueue[str], nodes: Sequence[HasButton]) -> None:
     """Do what the lines say that wait; what can't be done is reported in the log."""
     by_number = {str(node.number): node for node in nodes}
-    while not lines.empty():
+    for _ in range(lines.qsize()):  # and no more: a flood of lines must not stop the modules
         line = lines.get()
         words = line.split()
         if len(words) != 3 or words[0] not in by_number or words[1] != "emergency" or words[2] not in _BUTTON:

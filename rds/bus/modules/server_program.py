@@ -24,6 +24,9 @@ from rds.bus.tools.link import BUILTIN, bus_name, default_channel, pair
 from rds.core.errors import InputError, RdsError
 from rds.machines import load_machine
 
+_MOST_WAITING = 20  # lines that wait to be done; whoever says more waits
+_FULL = 0.02  # s until it is looked whether some are done
+_LONGEST_LINE = 4096  # bytes
 _BACKGROUND = 0.5  # s until a program in the background of its terminal looks for lines again
 
 
@@ -108,11 +111,14 @@ def _read_stdin(lines: queue.SimpleQueue[str] | None, ended: threading.Event | N
                 break
             time.sleep(_BACKGROUND)
             continue
-        if not data:
-            break
-        *whole, rest = (rest + data).split(b"\n")
+        *whole, rest = (rest + (data or b"\n" * bool(rest))).split(b"\n")  # the last line may lack its end
         if lines is not None:
             for line in whole:
+                while lines.qsize() >= _MOST_WAITING:
+                    time.sleep(_FULL)
                 lines.put(line.decode(errors="replace"))
+        rest = rest[:_LONGEST_LINE]
+        if not data:
+            break
     if ended is not None:
         ended.set()

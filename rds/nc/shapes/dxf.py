@@ -57,6 +57,8 @@ _PASSED_OVER = {
     **dict.fromkeys(("DIMENSION", "LEADER", "MULTILEADER", "TOLERANCE"), "dimensions"),
     "HATCH": "hatches",
 }
+_ONE_POINT = 1e-9  # of the longest chord of a spline: fit points nearer than this are one
+_FARTHEST = 1e12  # that a spline's fit points may lie from the origin, in the drawing's unit
 DEEPEST = 16  # blocks within one another
 _MESH, _FRAME, _SPACE = 16 | 64, 16, 8  # flags of a POLYLINE and of its VERTEX: meshes, control points, in space
 _IN_SPACE = ("LINE", "POINT", "ELLIPSE", "SPLINE")  # their places are those of the drawing, whatever their extrusion
@@ -322,7 +324,10 @@ def _through(fit: np.ndarray, body: Pairs) -> tuple[np.ndarray, np.ndarray]:
 
     is_closed = bool(int(number_of(body, 70)) & 1)
     points = np.vstack((fit, fit[:1])) if is_closed else fit
-    points = points[np.append(True, np.any(np.diff(points, axis=0), axis=1))]  # a point twice has no chord
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    points = points[np.append(True, steps > _ONE_POINT * steps.max())]  # a point twice has no chord
+    if is_closed:
+        points[-1] = points[0]
     chords = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
     if is_closed:
         spline = make_interp_spline(chords, points, bc_type="periodic")
@@ -344,6 +349,8 @@ def _spline(body: Pairs, scale: float, name: str) -> np.ndarray:
     if not len(control) and len(fit):
         if len(fit) < 3 or np.ptp(fit, axis=0).max() == 0.0:
             return fit
+        if np.abs(fit).max() > _FARTHEST:
+            raise InputError(f"a spline goes through a place beyond {_FARTHEST:g}; save the drawing again", name)
         degree, knots, control, weights = 3, *_through(fit, body), np.array([])
     n = len(control)
     if n <= degree or degree < 1 or len(knots) != n + degree + 1 or (len(weights) not in (0, n)):

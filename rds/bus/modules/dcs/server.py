@@ -199,11 +199,8 @@ def _serve(
         look = now + _LOOK
         if stop.is_set():
             return
-        while lines is not None and not lines.empty():
-            try:
-                handle(lines.get(), line, now)
-            except InputError as error:
-                LOG.error("%s", error)
+        if lines is not None:
+            _do_lines(lines, line, now)
         if orphaned is not None and orphaned.is_set():
             count = sum(unit.heard for unit in line.units)
             if count != heard:
@@ -211,6 +208,14 @@ def _serve(
             elif now - since > afterlife:
                 LOG.warning("the starter has gone and nobody commands: end")
                 return
+
+
+def _do_lines(lines: queue.SimpleQueue[str], line: FieldLine, at: float) -> None:
+    for _ in range(lines.qsize()):  # and no more: a flood of lines must not stop the units
+        try:
+            handle(lines.get(), line, at)
+        except InputError as error:
+            LOG.error("%s", error)
 
 
 def handle(text: str, line: FieldLine, at: float) -> None:
@@ -223,7 +228,7 @@ def handle(text: str, line: FieldLine, at: float) -> None:
             line.noise = NOISE.check(float(words[1]), "noise")
         except ValueError:
             raise InputError(f"noise {words[1]!r} must be a number from 0 to 1") from None
-    elif len(words) == 3 and words[0] == "unit" and words[2] in ("reset", "off") and words[1].isdigit():
+    elif len(words) == 3 and words[0] == "unit" and words[2] in ("reset", "off") and words[1].isdecimal():
         unit = line.unit(int(words[1]))
         if unit is None:
             numbers = ", ".join(str(each.number) for each in line.units)

@@ -219,7 +219,6 @@ class Mover:
         elif motion.direction > 0 and low.open:
             way = LEAVES * (plant.data.highest - plant.data.lowest) * plant.data.counts_per_unit
             if plant.counts - motion.turned > way:  # what opened was a wire: the zero is not here
-                plant.counter.set(plant.counts - motion.shift)
                 self._settle(Result.STOPPED_BY_LIMIT, now)
         elif motion.direction > 0:
             if motion.found:
@@ -237,6 +236,8 @@ class Mover:
         self.plant.drive(0.0, at)
 
     def _close(self, answers: Acknowledges, result: Result) -> None:
+        if self.motion is not None and self.motion.shift and result != Result.CARRIED_OUT:
+            self.plant.counter.set(self.plant.counts - self.motion.shift)  # the zero of a homing that failed is none
         self.finished.append((answers, result))
         self.last_result = result
         self.motion = None

@@ -79,7 +79,7 @@ def _make_node(
 
 
 def _do_lines(lines: queue.SimpleQueue[str], nodes: Sequence[OacsNode]) -> None:
-    while not lines.empty():
+    for _ in range(lines.qsize()):  # and no more: a flood of lines must not stop the modules
         try:
             handle(lines.get(), nodes)
         except InputError as error:
