@@ -221,7 +221,7 @@ class _Reader:
         elif kind == "SPLINE":
             self._add(_spline(body, _size(m), self.name), bool(int(number_of(body, 70)) & 1), layer, m)
             if not len(places_of(body, 10)):
-                self._pass_over("control points, which a spline lacks: a natural cubic goes through its fit points")
+                self._pass_over("control points, which a spline lacks: a cubic goes through its fit points")
         elif kind == "INSERT":
             self._insert(body, layer, m, depth)
         else:
