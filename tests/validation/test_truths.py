@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import rds
 from benchmarks.truths import cases, machine
 from benchmarks.verdicts import Row, rates, rows, table
 from rds.identification.validate.assessment import assess
 from rds.identification.validate.judge import judge
 from rds.identification.validate.verdict import Bands, Word
 
-FRICTIONLESS = """params = {"tau": 9.943e-3, "K": 1.764}
-initial_state = [0.0, 0.0]
-
-
-def derivatives(t, x, u, params):
-    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]
-"""
 KINDS = ("truth", "tau off by 30 %", "K 5 % off", "a hidden delay", "K 5 % off, a file of one's own")
 
 
@@ -55,17 +45,6 @@ def test_play_may_begin_anywhere_within_its_width() -> None:
     """Of a file of one's own, the way before axis and model have been driven the same way tells nothing."""
     (row,) = rows(333, ["truth, a file of one's own"])
     assert row.right and row.suffices and not row.error
-
-
-def test_of_one_speed_in_each_direction_friction_is_not_taken_for_gain(tmp_path: Path) -> None:
-    """A file of one's own without friction, with the gain of the axis: 0.539 mm/s of friction are 15.3 % of 2 V."""
-    (tmp_path / "mine.py").write_text(FRICTIONLESS)
-    time = np.arange(4000) * 1e-3
-    volts = np.where(np.sin(2.0 * np.pi * time) >= 0.0, 2.0, -2.0)
-    position = np.round(np.ravel(rds.lsim("linear-axis", volts, time)[1]) / 0.0005) * 0.0005
-    found = rds.validate(tmp_path / "mine.py", rds.Log("square", time, volts, position, resolution=0.0005)).verdict
-    assert found.word is Word.NOT and "its friction is too low by 15.3 % of the largest command" in str(found)
-    assert "this log does not tell the gain\n" in str(found) and "its gain is" not in str(found)
 
 
 def test_a_few_steps_of_an_encoder_without_noise_do_not_suffice() -> None:

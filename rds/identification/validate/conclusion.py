@@ -17,17 +17,11 @@ DATA = "data-"  # how the kind of a reason begins that is a finding about the lo
 def conclude(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
     """The word of the verdict, and what the model is valid for where that is only something."""
     cannot_tell = {reason.kind for reason in reasons if reason.side is Side.CANNOT_TELL}
-    untold = {kind for kind in cannot_tell if kind != "same-data" and not kind.startswith(DATA)}
-    if untold and not (untold == {"gain-unidentifiable"} and _is_wrong_whatever_its_gain(reasons)):
+    if any(kind != "same-data" and not kind.startswith(DATA) for kind in cannot_tell):
         return Word.CANNOT_TELL, ""
     word, purpose = _from_errors(a, reasons, bands)
     # what fails even on its own data, or on faulty ones, has failed; what passes there has shown nothing
     return (Word.CANNOT_TELL, "") if cannot_tell and word is not Word.NOT else (word, purpose)
-
-
-def _is_wrong_whatever_its_gain(reasons: list[Reason]) -> bool:
-    """Whether the friction is off, told beside a gain that is not: then one of the two is wrong."""
-    return any(reason.kind == "friction" and reason.side is Side.AGAINST for reason in reasons)
 
 
 def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:

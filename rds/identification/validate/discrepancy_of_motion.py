@@ -9,7 +9,6 @@ from math import degrees, pi, sqrt
 import numpy as np
 
 from rds.identification.fit.residuals import effective_samples
-from rds.identification.logs.excitation import has_one_level
 from rds.identification.logs.log import Log
 from rds.identification.validate.discrepancy import (
     EXPLAINED,
@@ -44,8 +43,7 @@ def as_motion(
     rate = x if is_rate else np.gradient(x, t)
     if not np.ptp(x) > 1e-6 * max(float(np.ptp(y)), 1e-300):
         return None
-    is_one = has_one_level(log)
-    K, tau_shown = _first_order(rate, np.gradient(rate, t), u, T, with_friction=not is_one)
+    K, tau_shown = _first_order(rate, np.gradient(rate, t), u, T)
     tau = max(tau, T) if tau > 0.0 else tau_shown
     f = frequency or 1.0 / (4.0 * pi * tau)
     change = _backward(x, T)
@@ -61,17 +59,13 @@ def as_motion(
         both -= own @ np.linalg.lstsq(own, both, rcond=None)[0]
         A[a:b], residual[a:b] = both[:, :-1], both[:, -1]
     scale = np.linalg.norm(A, axis=0)
-    kept = np.array([k < 3 or scale[k] > 1e-9 * np.linalg.norm(column) for k, column in enumerate(columns)])
+    kept = np.concatenate([np.ones(3, dtype=bool), scale[3:] > 1e-9 * np.linalg.norm(np.stack(columns[3:]), axis=1)])
     A, scale = A[:, kept], scale[kept]
     if not (scale > 0.0).all():
         return None
-    found, gram = np.ones(A.shape[1]), np.zeros((A.shape[1], A.shape[1]))
-    # of one speed in each direction the gain and the friction cannot be told apart: the gain is taken as it is
-    at = 1 if is_one else 0
-    B = (A / scale)[:, at:]
-    found[at:] = np.linalg.lstsq(B, residual - A[:, :at] @ found[:at], rcond=1e-10)[0] / scale[at:]
+    found = np.linalg.lstsq(A / scale, residual, rcond=1e-10)[0] / scale
     error = residual - A @ found
-    gram[at:, at:] = np.linalg.pinv(B.T @ B, rcond=1e-14) / np.outer(scale[at:], scale[at:])
+    gram = np.linalg.pinv((A / scale).T @ (A / scale), rcond=1e-14) / np.outer(scale, scale)
     worth, left = effective_samples(error), float(np.sum((residual - A[:, 0]) ** 2))
     covariance = gram * float(error @ error) / worth
     slope = (1.0 - np.exp(-2j * pi * f * T)) / T  # of the backward difference at f
@@ -81,9 +75,7 @@ def as_motion(
 
     return Discrepancy(
         frequency=f,
-        gain=Off(0.0, float("inf"), "%")
-        if is_one
-        else min((_gain(*rates), _gain_of_way(found, covariance)), key=lambda off: off.error),
+        gain=min((_gain(*rates), _gain_of_way(found, covariance)), key=lambda off: off.error),
         phase=Off(phase(found), error_of(phase, found, covariance), "°"),
         lag=Off(-float(found[1]), sqrt(max(float(covariance[1, 1]), 0.0)), "s"),
         friction=_friction_of_ways(found, covariance, kept, K, float(np.abs(u).max())),
@@ -148,10 +140,8 @@ def _gain(measured: np.ndarray, modelled: np.ndarray) -> Off:
     return Off(100.0 * (1.0 / ratio - 1.0), 100.0 * spread / ratio**2, "%")
 
 
-def _first_order(
-    rate: np.ndarray, change: np.ndarray, u: np.ndarray, T: float, with_friction: bool
-) -> tuple[float, float]:
+def _first_order(rate: np.ndarray, change: np.ndarray, u: np.ndarray, T: float) -> tuple[float, float]:
     """Gain (unit/s per V) and time constant (s) of the model, by its own motion: rate = K u - τ change - friction."""
-    A = np.stack([u, -change, np.ones(len(u)), *([-np.sign(rate)] if with_friction else [])], axis=1)
+    A = np.stack([u, -change, -np.sign(rate), np.ones(len(u))], axis=1)
     K, tau = np.linalg.lstsq(A, rate, rcond=1e-9)[0][:2]
     return float(K), float(np.clip(tau, 2.0 * T, 10.0))

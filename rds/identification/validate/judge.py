@@ -147,8 +147,7 @@ def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
         elif measure.told:
             yield Reason(Side.FOR, measure.kind, what)
         elif measure.kind == "gain":
-            untold = f": {what}" if off.error < float("inf") else ""
-            yield Reason(Side.CANNOT_TELL, "gain-unidentifiable", f"this log does not tell the gain{untold}")
+            yield Reason(Side.CANNOT_TELL, "gain-unidentifiable", f"this log does not tell the gain: {what}")
         else:
             yield Reason(
                 Side.NOTE, f"{measure.kind}-unidentifiable", f"this log does not tell the {measure.kind}: {what}"
