@@ -58,7 +58,7 @@ def excitation(log: Log, axis: Axis | None) -> list[Finding]:
                 f"the axis never moves in the {word} direction: the friction of that direction (F{sign}) cannot be told"
             )
             found.append(Finding("excitation", what, Gravity.WARNING))
-    if not constant and _levels(log.command, 1.0) <= 1 and _levels(log.command, -1.0) <= 1:
+    if has_one_level(log):
         what = (
             "the command has one level in each direction: from one steady speed the gain K and the friction cannot be "
             "told apart; use two amplitudes or more, or a signal that sweeps"
@@ -70,6 +70,12 @@ def excitation(log: Log, axis: Axis | None) -> list[Finding]:
         what = "the axis never stands still against a command: the data say little about friction at standstill"
         found.append(Finding("excitation", what))
     return found
+
+
+def has_one_level(log: Log) -> bool:
+    """Whether the command changes and has one level in each direction: its steady speeds tell no gain by themselves."""
+    command = log.command
+    return bool(np.ptp(command) > 0.0) and _levels(command, 1.0) <= 1 and _levels(command, -1.0) <= 1
 
 
 def is_steady(log: Log) -> bool:

@@ -10,7 +10,7 @@ from rds.identification.validate.candidate import Candidate
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
 from rds.identification.validate.within import foreseen_at, frequency_told, passes
 
-WRONG = frozenset({"gain", "phase", "delay", "friction", "loop"})  # what a loop would feel, or does
+WRONG = frozenset({"gain", "phase", "delay", "friction", "speed", "loop"})  # what a loop would feel, or does
 DATA = "data-"  # how the kind of a reason begins that is a finding about the log
 
 

@@ -67,7 +67,8 @@ class Discrepancy:
 
     `lag` is the model's time constant and delay, less the log's; `delay` the delay alone. As the axis, `rmse` is what
     the model leaves of the log and `reached` the fit, in the position's unit; as motion there is no delay apart from
-    the lag, and friction only of a motion both ways.
+    the lag, and friction only of a motion both ways. A log with one level of command each way tells gain and friction
+    together only: as motion there is `speed` for both.
     """
 
     frequency: float
@@ -76,6 +77,7 @@ class Discrepancy:
     lag: Off  # s
     delay: Off | None = None  # s
     friction: Off | None = None  # % of the largest command
+    speed: Off | None = None  # %, as motion of a log with one level of command each way
     rmse: float = 0.0
     reached: float = 0.0
     by_chance: bool = False  # whether what the model leaves is as little as the truth itself may leave beside the fit

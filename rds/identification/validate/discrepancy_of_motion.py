@@ -9,6 +9,7 @@ from math import degrees, pi, sqrt
 import numpy as np
 
 from rds.identification.fit.residuals import effective_samples
+from rds.identification.logs.excitation import has_one_level
 from rds.identification.logs.log import Log
 from rds.identification.validate.discrepancy import (
     EXPLAINED,
@@ -47,7 +48,8 @@ def as_motion(
     tau = max(tau, T) if tau > 0.0 else tau_shown
     f = frequency or 1.0 / (4.0 * pi * tau)
     change = _backward(x, T)
-    ways = [sign.astype(float) for sign in _signs(x if is_rate else change)]
+    is_one = has_one_level(log)
+    ways = _ways(x if is_rate else change, is_one)
     columns = [x, -change, _backward(change, T), *(ways if is_rate else [np.cumsum(way) * T for way in ways])]
     parts = len(stretches(log.part(first, len(log)), tau)) if log.closed_loop else 1
     A = np.stack(columns, axis=1)
@@ -59,7 +61,7 @@ def as_motion(
         both -= own @ np.linalg.lstsq(own, both, rcond=None)[0]
         A[a:b], residual[a:b] = both[:, :-1], both[:, -1]
     scale = np.linalg.norm(A, axis=0)
-    kept = np.concatenate([np.ones(3, dtype=bool), scale[3:] > 1e-9 * np.linalg.norm(np.stack(columns[3:]), axis=1)])
+    kept = np.array([k < 3 or scale[k] > 1e-9 * np.linalg.norm(column) for k, column in enumerate(columns)])
     A, scale = A[:, kept], scale[kept]
     if not (scale > 0.0).all():
         return None
@@ -75,15 +77,29 @@ def as_motion(
 
     return Discrepancy(
         frequency=f,
-        gain=min((_gain(*rates), _gain_of_way(found, covariance)), key=lambda off: off.error),
+        gain=Off(0.0, float("inf"), "%")
+        if is_one
+        else min((_gain(*rates), _gain_of_way(found, covariance)), key=lambda off: off.error),
         phase=Off(phase(found), error_of(phase, found, covariance), "°"),
         lag=Off(-float(found[1]), sqrt(max(float(covariance[1, 1]), 0.0)), "s"),
-        friction=_friction_of_ways(found, covariance, kept, K, float(np.abs(u).max())),
+        friction=None if is_one else _friction_of_ways(found, covariance, kept, K, float(np.abs(u).max())),
+        speed=_speed(*rates) if is_one else None,
         rmse=sqrt(left / len(y)),
         reached=float(np.sqrt(np.mean(error**2))),
         by_chance=left <= len(y) * (EXPLAINED * float(noise)) ** 2
         and by_chance(left, float(error @ error), worth, A.shape[1]),
     )
+
+
+def _ways(rate: np.ndarray, is_one: bool) -> list[np.ndarray]:
+    """What a velocity may have beside a gain: a constant of each direction, each (n,).
+
+    Of one speed each way these constants are the gain; there the gain may differ by direction.
+    """
+    signs = _signs(rate)
+    if is_one:
+        return [np.abs(rate)] if all(sign.any() for sign in signs) else []
+    return [sign.astype(float) for sign in signs]
 
 
 def _friction_of_ways(
@@ -138,6 +154,21 @@ def _gain(measured: np.ndarray, modelled: np.ndarray) -> Off:
     if not ratio > 0.0:
         return Off(float("inf"), 0.0, "%")
     return Off(100.0 * (1.0 / ratio - 1.0), 100.0 * spread / ratio**2, "%")
+
+
+def _speed(measured: np.ndarray, modelled: np.ndarray) -> Off:
+    """By how many per cent the model's speed is too large, of the direction where that is clearer.
+
+    A lag has a column of its own: the model's changes from block to block.
+    """
+    columns = [np.where(way, modelled, 0.0) for way in _signs(modelled) if way.any()]
+    if not columns:
+        return Off(0.0, float("inf"), "%")
+    A = np.stack([*columns, np.gradient(modelled)], axis=1)
+    found = np.linalg.lstsq(A, measured, rcond=1e-10)[0]
+    error = measured - A @ found
+    covariance = np.linalg.pinv(A.T @ A) * float(error @ error) / effective_samples(error)
+    return max((_gain_of_way(found[k:], covariance[k:, k:]) for k in range(len(columns))), key=clear)
 
 
 def _first_order(rate: np.ndarray, change: np.ndarray, u: np.ndarray, T: float) -> tuple[float, float]:

@@ -146,8 +146,9 @@ def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
             yield Reason(Side.AGAINST, measure.kind, what)
         elif measure.told:
             yield Reason(Side.FOR, measure.kind, what)
-        elif measure.kind == "gain":
-            yield Reason(Side.CANNOT_TELL, "gain-unidentifiable", f"this log does not tell the gain: {what}")
+        elif measure.kind in ("gain", "speed"):
+            untold = f"this log does not tell the {measure.kind}: {what}"
+            yield Reason(Side.CANNOT_TELL, f"{measure.kind}-unidentifiable", untold)
         else:
             yield Reason(
                 Side.NOTE, f"{measure.kind}-unidentifiable", f"this log does not tell the {measure.kind}: {what}"
@@ -158,11 +159,14 @@ def _said_of(measure: Measure, frequency: float) -> str:
     """A clause: what the model is off by."""
     value = measure.off.value
     size, more = _shown(abs(value), measure.off.unit), value > 0.0
-    if measure.kind == "gain" and value == float("inf"):
+    if measure.kind in ("gain", "speed") and value == float("inf"):
         return "the axis does not move as the model does, or moves the other way"
     if measure.kind == "gain":
         where = f" at {measure.off.at:.2g} Hz" if measure.off.at > 0.0 else ""
         return f"its gain{where} is {size} too {'high' if more else 'low'}"
+    if measure.kind == "speed":
+        blame = ", by its gain or its friction, which this log does not tell apart" if measure.wrong else ""
+        return f"its speed is {size} too {'high' if more else 'low'}{blame}"
     if measure.kind == "phase":
         return f"at {frequency:.2g} Hz its phase {'leads' if more else 'lags'} that of the axis by {size}"
     if measure.kind == "delay":

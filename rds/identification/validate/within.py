@@ -16,7 +16,7 @@ AS_NOISE = 1.2  # times what noise makes of an error: no model could be better
 _SURE = 2.6  # standard errors: 99 %
 _SURE_OF_DELAY = 5.0  # a delay and a time constant make up for each other, by more than derivatives say
 _LIKELY = 2.0  # 95 %
-_UNTOLD = {"gain": 2.0, "phase": 1.4}  # times the band: what the log leaves open is that wide
+_UNTOLD = {"gain": 2.0, "speed": 2.0, "phase": 1.4}  # times the band: what the log leaves open is that wide
 _SLIGHT = 0.25  # of the bands
 _SLIGHT_FIT = (99.5, 98.0)  # %, of position and velocity
 
@@ -64,7 +64,7 @@ def foreseen_at(a: Assessment, bands: Bands) -> list[int]:
 class Measure:
     """What the model is off by in one thing, beside its band."""
 
-    kind: str  # gain, phase, delay, friction
+    kind: str  # gain, phase, delay, friction, speed
     off: Off
     band: float
     by_chance: bool = False  # what the model leaves is no more than chance makes the truth leave
@@ -104,26 +104,31 @@ def judged_by(a: Assessment, bands: Bands) -> Discrepancy | None:
 
 
 def measures(a: Assessment, bands: Bands) -> list[Measure]:
-    """Gain and phase, and delay and friction where they are known; empty where nothing is."""
+    """Gain and phase, and delay and friction where they are known; empty where nothing is.
+
+    Of a motion with one level of command each way: the speed in place of gain and friction.
+    """
     found = judged_by(a, bands)
     if found is None:
         return []
-    listed = [
-        Measure("gain", found.gain, bands.gain_percent, found.by_chance),
-        Measure("phase", found.phase, bands.phase_degrees, found.by_chance),
-    ]
+    listed = _gain_and_phase(found, bands)
     if (motion := a.as_motion) is not None and found is not motion and motion.rmse <= AS_NOISE * a.noise:
         # the model leaves noise alone: what the parameters of an axis leave open, the motion itself may tell
-        beside = (
-            Measure("gain", motion.gain, bands.gain_percent, motion.by_chance),
-            Measure("phase", motion.phase, bands.phase_degrees, motion.by_chance),
-        )
+        beside = _gain_and_phase(motion, bands)
         listed = [b if not m.told and b.told and not b.wrong else m for m, b in zip(listed, beside, strict=True)]
     if found.delay is not None:
         listed.append(Measure("delay", found.delay, max(bands.delay, 1.5 * a.log.sample_period), found.by_chance))
     if found.friction is not None:
         listed.append(Measure("friction", found.friction, bands.friction_percent, found.by_chance))
     return listed
+
+
+def _gain_and_phase(found: Discrepancy, bands: Bands) -> list[Measure]:
+    kind, off = ("gain", found.gain) if found.speed is None else ("speed", found.speed)
+    return [
+        Measure(kind, off, bands.gain_percent, found.by_chance),
+        Measure("phase", found.phase, bands.phase_degrees, found.by_chance),
+    ]
 
 
 def frequency_told(a: Assessment, bands: Bands) -> float | None:
@@ -142,7 +147,7 @@ def slight(a: Assessment, bands: Bands) -> bool:
 
     No test of the residual, and no error that noise makes, matters then.
     """
-    found = [m for m in measures(a, bands) if m.kind in ("gain", "phase")]
+    found = [m for m in measures(a, bands) if m.kind in ("gain", "speed", "phase")]
     if found and as_good(a) and all(m.told and not m.wrong for m in measures(a, bands) if m.kind != "friction"):
         return True
     if a.free_run is None or not found or any(m.reach > _SLIGHT * m.band for m in found):
