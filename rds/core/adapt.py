@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from itertools import chain
-from math import isclose
+from math import isclose, nan
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from rds.core.integrate import rk4
 from rds.core.timed_motion import TimedMotion
 from rds.core.types import Controller, Model, Reference, Source
 
+_SAME = 1e-9
 Rows = tuple[tuple[float, ...], ...]
 
 
@@ -34,7 +35,8 @@ def as_controller(obj: Any, T: float) -> Controller:
     """A python-control system as a controller sampled every `T` s; a `Controller` comes back as it is.
 
     One output, the voltage (V); and 1 input, the error r - y; or 2, r.position and y; or 4, r.position, r.velocity,
-    r.acceleration and y (as `rds.controllers.design.tracking_controller_system`). It starts from the zero state.
+    r.acceleration and y (as `rds.controllers.design.tracking_controller_system`). It starts from the zero state; a
+    linear one to which every place is alike, such as one with an observer, counts positions from the first measured.
     Raises InputError for other sizes, another sample period or another kind of object.
     """
     if isinstance(obj, Controller):
@@ -49,6 +51,8 @@ def as_controller(obj: Any, T: float) -> Controller:
     state = (0.0,) * (sys.nstates or 0)
     if _is_linear(sys):
         params = _matrices(sys.sample(T, method="bilinear") if continuous and state else sys)
+        if state and _is_alike_everywhere(params):
+            return Controller(_control_from_origin, (nan, *state), params, Source(_name(sys)))
         return Controller(_linear_control, state, params, Source(_name(sys)))
     step = partial(_nonlinear_control, sys=sys, T=T, continuous=continuous)
     return Controller(step, state, dict(sys.params), Source(_name(sys)))
@@ -172,6 +176,27 @@ def _linear_control(t: float, r: Reference, y: float, state: Sequence[float], pa
     inputs = _inputs(len(D[0]), r, y)
     moved = tuple(_dot(a, state) + _dot(b, inputs) for a, b in zip(A, B, strict=True))
     return float(_dot(C[0], state) + _dot(D[0], inputs)), moved
+
+
+def _is_alike_everywhere(params: Any) -> bool:
+    """Whether a state at rest under zero volts belongs to every place: an observer's, not that of a spring's force."""
+    A, B, C, D = (np.array(params[name]) for name in "ABCD")
+    place = {2: [1.0, 1.0], 4: [1.0, 0.0, 0.0, 1.0]}.get(D.shape[1])
+    if place is None:  # of the error r - y
+        return False
+    left = np.vstack([np.eye(len(A)) - A, C])
+    right = np.concatenate([B @ place, -D @ place])
+    state = np.linalg.lstsq(left, right, rcond=None)[0]
+    return bool(np.abs(left @ state - right).max() <= _SAME * (np.abs(left) @ np.abs(state) + np.abs(right)).max())
+
+
+def _control_from_origin(t: float, r: Reference, y: float, state: Sequence[float], params: Any) -> tuple[float, Any]:
+    """As `_linear_control` for positions from the first measured one, the state's first number (NaN before it)."""
+    origin, *own = state
+    if origin != origin:
+        origin = y
+    u, moved = _linear_control(t, Reference(r[0] - origin, r[1], r[2]), y - origin, own, params)
+    return u, (origin, *moved)
 
 
 def _linear_advance(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from math import exp
 
 import control
 import numpy as np
 import pytest
 
+import rds
 from rds.controllers.design import tracking_controller_system
 from rds.core.adapt import as_controller, as_model, is_control_system
 from rds.core.errors import InputError
@@ -194,3 +196,33 @@ def test_a_continuous_model_advances_by_any_time_and_a_discrete_one_by_its_perio
     sampled = as_model(control.sample_system(AXIS, T), T)
     with pytest.raises(InputError, match="made for a sample period"):
         sampled.advance(sampled.initial_state, 1.0, 2 * T, sampled.params)
+
+
+@pytest.mark.parametrize("sampled", [T, None])
+def test_an_observer_counts_positions_from_where_the_axis_stands(sampled: float | None) -> None:
+    """From the zero state the axis would be taken for one that has leapt 64 mm in a sample."""
+    system = tracking_controller_system(TAU, K, [-32 + 24j, -32 - 24j], -320.0, sampled)
+    runs = []
+    for place in (0.0, 64.0):
+        axis = rds.library_model("linear-axis", tau=TAU, K=K, friction_plus=0.5, friction_minus=-0.5)
+        experiment = rds.Experiment(
+            duration=0.5,
+            sample_period=T,
+            controller=system,
+            model=replace(axis, initial_state=(place, 0.0)),
+            reference=rds.square(amplitude=0.01, frequency=4.0, offset=place),
+            interface={"quantization": False, "saturation": False},
+        )
+        run = experiment.run()
+        runs.append((run["X_voltage"], run["X_measured"] - place))
+    np.testing.assert_allclose(runs[1][0], runs[0][0], atol=1e-8)
+    np.testing.assert_allclose(runs[1][1], runs[0][1], atol=1e-11)
+    assert np.abs(runs[1][0]).max() < 1.0
+
+
+def test_a_law_with_a_force_of_its_place_takes_positions_as_they_are() -> None:
+    """It holds against a spring, 0.1 V/mm, with a filtered position."""
+    spring = control.ss([[0.9]], [[0.0, 0.1]], [[0.1]], [[20.0, -20.0]], T)
+    law = as_controller(spring, T)
+    u, state = law.control(0.0, Reference(30.0, 0.0, 0.0), 30.0, law.initial_state, law.params)
+    assert u == 0.0 and state == (3.0,)
