@@ -376,7 +376,7 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
         name, unit = name_and_unit(cell.strip('"'))
         if units[i] is not None and unit is not None and dimension(unit) is None:
             name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
-        names.append(f"column {i + 1}" if i in numbers or not name else name)
+        names.append(f"column {i + 1}" if i in numbers - filled or not name else name)
         if unit and units[i] and dimension(unit) and dimension(units[i] or "") and plain(unit) != plain(units[i] or ""):
             torn.append(f"{name} in {unit}, and {units[i]} below")
         units[i] = unit if unit is not None else units[i]
