@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -112,6 +113,15 @@ def _show_crossed(crossed: list[CrossTestResult]) -> None:
     show_table("Cross-test", heads, rows, note)
 
 
+def _known(value: float) -> float | None:
+    """None for a figure that too short a log, or a response that is not finite, leaves undefined."""
+    return value if isfinite(value) else None
+
+
+def _weight(value: float) -> str:
+    return f"{value:.3f}" if isfinite(value) else "–"
+
+
 def _show(made: Validation) -> None:
     from rds.cli.console import cell, show_table
 
@@ -129,8 +139,9 @@ def _show(made: Validation) -> None:
     for name, ranking in made.rankings.items():
         rows = [
             [
-                *(r.name, str(r.counted), cell(r.rmse), cell(r.aicc_difference), f"{r.aicc_weight:.3f}"),
-                *(cell(r.bic_difference), f"{r.bic_weight:.3f}"),
+                *(r.name, str(r.counted), cell(_known(r.rmse))),
+                *(cell(_known(r.aicc_difference)), _weight(r.aicc_weight)),
+                *(cell(_known(r.bic_difference)), _weight(r.bic_weight)),
             ]
             for r in ranking.ranks
         ]

@@ -12,12 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.identification.fit.fit import fit
 from rds.identification.logs import sampling
 from rds.identification.logs.describe import describe
 from rds.identification.logs.log import Finding, Gravity, Log
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.steps import step_of
 from rds.identification.logs.time_base import time_base
+from rds.identification.structures.structures import structure
+from rds.results import Result
 from tests.logs.data_files import MAP, axis, headed, write
 
 Columns = dict[str, np.ndarray]
@@ -326,6 +329,20 @@ def test_a_slip_of_the_encoder_has_its_time(tmp_path: Path) -> None:
     alone = good["position"].copy()
     alone[2000] += 0.12  # one reading, there and back
     assert "leap" not in grave(read(tmp_path, good | {"position": alone}))
+
+
+def test_a_leap_of_a_run_whose_samples_were_late_may_be_one_of_these(tmp_path: Path) -> None:
+    made = axis()
+    made["position"][2000:] += 0.12
+    columns = {"time": made["time"], "X_voltage": made["voltage"], "X_measured": made["position"]}
+    meta = {"axes": ["X"], "sample_period": 1e-3, "mode": "system-test", "machine": "mini-cnc", "voltage_range": 10.0}
+    for verdict, asked in (("void", True), ("met", False)):
+        where = Result(columns, {}, meta | {"verdict": verdict}).save(tmp_path / verdict)
+        (log,) = read_log(where)
+        assert ("Or was that sample late" in grave(log)["leap"].what) == asked
+        said = fit([log], structure("axis"), "simulation").warnings
+        (leap,) = [sentence for sentence in said if "the measurement leaps" in sentence]
+        assert leap.endswith("Or was that sample late, as the run's timing says of some?") == asked
 
 
 def test_sampling_that_is_too_slow_is_told_with_the_period_that_would_do(tmp_path: Path) -> None:

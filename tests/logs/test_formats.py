@@ -58,6 +58,25 @@ def test_mat_vectors_structs_matrices_and_constants(tmp_path: Path) -> None:
     }
 
 
+def test_the_coefficients_in_a_workspace_are_no_log(tmp_path: Path) -> None:
+    """Of a workspace that was saved as a whole, most vectors may be those of transfer functions."""
+    from scipy.io import savemat
+
+    made = axis()
+    savemat(tmp_path / "log.mat", {**made, **{f"den{k}": [1.0, 0.1 * k] for k in range(1, 8)}})
+    assert set(read_table(tmp_path / "log.mat").columns) == set(made)
+
+
+def test_a_cell_array_is_sent_back_with_what_to_save(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    runs = np.empty((1, 2), dtype=object)
+    runs[0, 0] = runs[0, 1] = {"time": axis()["time"]}
+    savemat(tmp_path / "log.mat", {"runs": runs})
+    with pytest.raises(InputError, match=r"left out: runs; of a cell array .* run = runs\{1\}; save"):
+        read_table(tmp_path / "log.mat")
+
+
 @pytest.mark.parametrize(("labels", "names"), [(("u", "x"), ("u", "x")), (("", ""), ("1", "2"))])
 def test_the_signals_of_a_scope_are_columns(labels: tuple[str, str], names: tuple[str, str], tmp_path: Path) -> None:
     """Simulink's "structure with time": the ports of a scope are an array of structs."""

@@ -235,6 +235,16 @@ def test_a_first_row_with_another_separator_is_told(tmp_path: Path) -> None:
     assert "was passed over: '0.0e+000 1.2e+000" in told
 
 
+def test_notes_beside_the_headings_are_none_of_them(tmp_path: Path) -> None:
+    """A number there stands above blanks alone."""
+    head = "RPM [rev/min],time [s],,Record time: 1582.458,,delta_T,0.0176\n"
+    path = tmp_path / "run.csv"
+    path.write_text(head + "".join(f"{x:.6f},{k / 1000},,,,,\n" for k, x in enumerate(X)))
+    table = read_table(path)
+    assert list(table.columns) == ["RPM", "time", "column 3", "Record time: 1582.458", "column 5", "delta_T"]
+    assert np.allclose(table.columns["RPM"].values, X, atol=1e-6) and table.columns["time"].unit == "s"
+
+
 def test_a_preamble_with_numbers_is_no_lost_row(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("Attenuation,10,10\nt [s],u [V],x [mm]\n" + "0.1,2,3\n0.2,3,4\n" * 3)
     assert not read_table(tmp_path / "a.csv").findings

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from math import exp, log, pi
 
 import numpy as np
@@ -22,7 +24,7 @@ from rds.identification.validate.assessment import assess, smoothed_velocity
 from rds.identification.validate.candidate import Candidate
 from rds.identification.validate.criterion import Rival, rank
 from rds.identification.validate.discrepancy import error_of
-from rds.identification.validate.validate import compare_models
+from rds.identification.validate.validate import compare_models, validate
 from tests.validation.validation_logs import STEP, T, X, candidate, moved, square
 from tests.validation.validation_logs import log as made_log
 
@@ -263,6 +265,20 @@ def test_a_model_without_a_finite_response_has_no_weight() -> None:
         rank([Rival("wild", np.full(3, np.inf), 2, 2, False)] * 2)
 
 
+def test_what_a_short_log_leaves_undefined_is_shown_as_a_dash(capsys: pytest.CaptureFixture[str]) -> None:
+    from rds.cli.validate import _show
+    from rds.identification.validate.report import _ranking
+
+    e = np.random.default_rng(4).standard_normal(12)
+    ranking = rank([Rival("plain", e, 12, 2, True), Rival("rich", 0.999 * e, 14, 2, True)])
+    assert all(row.aicc_difference == np.inf for row in ranking.ranks)
+    found = replace(validate(candidate(), made_log(square())), rankings={"short": ranking})
+    _show(found)
+    shown = capsys.readouterr().out
+    table = shown[shown.index("Models compared") :]
+    assert "–" in table and not re.search(r"\b(inf|nan)\b", table + _ranking(ranking))
+
+
 def test_models_are_compared_on_one_log() -> None:
     data = made_log(square())
     models = [candidate(name="right"), candidate(X | {"friction_plus": 0.0, "friction_minus": 0.0}, name="bare")]
@@ -292,3 +308,12 @@ def test_the_bandwidth_of_a_long_log_is_summed_over_its_parts() -> None:
     assert bandwidth(rate, T) == pytest.approx(11.0, abs=0.02)
     assert bandwidth(rate[:LONGEST], T) == pytest.approx(11.0, abs=0.02)
     assert bandwidth(np.full(2 * LONGEST, 3.0), T) == 0.0
+
+
+@pytest.mark.parametrize("samples", [40, 100, 160])
+def test_a_short_log_may_begin_with_its_step(samples: int) -> None:
+    """Its few first samples show velocities that are all above that of their begin, which is rest."""
+    volts = np.repeat([2.0, -3.0, 4.0, -2.0], samples // 4)
+    true = {"tau": 20e-3, "K": 1.764, "friction_plus": 0.539, "friction_minus": -0.222}
+    a = assess(candidate(true), made_log(volts, moved(volts, true, step=1e-6)))
+    assert abs(a.initial_state[1]) < 0.01 and a.free_run is not None and a.free_run.fit_percent > 99.0

@@ -82,6 +82,21 @@ def test_of_one_speed_each_way_gain_and_friction_are_told_together(
     assert said in verdict.sentence and (verdict.word is Word.VALID) == (said == "is valid for")
 
 
+@pytest.mark.parametrize(("back", "noise"), [(2.0, 0.03), (1.97, 0.015)])
+def test_noise_of_a_measured_voltage_makes_no_second_level_of_it(tmp_path: Path, back: float, noise: float) -> None:
+    """A gain twice too high, with the friction that makes the same speed of it: it was called 10 % too low."""
+    friction = 0.539 + 1.764 * (2.0 + back) / 2.0
+    (tmp_path / "mine.py").write_text(OWN.format(tau=9.943e-3, K=2 * 1.764, F=friction))
+    axis = rds.library_model("linear-axis", tau=9.943e-3, K=1.764, friction_plus=0.539, friction_minus=-0.539)
+    time = np.arange(4000) * 1e-3
+    volts = np.where(np.sin(2.0 * np.pi * time) >= 0.0, 2.0, -back)
+    volts += noise * np.random.default_rng(3).standard_normal(4000)
+    position = np.round(np.ravel(rds.lsim(axis, volts, time)[1]) / 0.0005) * 0.0005
+    verdict = rds.validate(tmp_path / "mine.py", rds.Log("square", time, volts, position, resolution=0.0005)).verdict
+    kinds = {reason.kind for reason in verdict.reasons}
+    assert "speed" in kinds and not {"gain", "gain-unidentifiable", "friction"} & kinds
+
+
 def test_a_few_steps_of_an_encoder_without_noise_do_not_suffice() -> None:
     few, many = next(cases(504)), next(cases(8))
     assert np.ptp(few.log.position) < 20.0 * few.machine.resolution and not few.suffices and many.suffices

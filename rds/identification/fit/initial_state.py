@@ -96,11 +96,12 @@ def _first_guess(states: int, t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray,
     x, low, high = np.zeros(states), np.full(states, -np.inf), np.full(states, np.inf)
     x[0] = y[0]
     if states > 1 and len(y) > _FEW:
-        slopes = (y[_FEW:] - y[:-_FEW]) / (t[_FEW:] - t[:-_FEW])
+        few = min(_FEW, (len(y) - 1) // 2)  # of so few samples that two windows after one another fit into them
+        slopes = (y[few:] - y[:-few]) / (t[few:] - t[:-few])
         x[1] = np.polyfit(t[:_FEW] - t[0], y[:_FEW], 1)[0]
         # at a window's edge the velocity is off its mean by half of what it changes over the window, and by more where
         # the axis stops or turns in it
-        change = float(np.abs(slopes[_FEW:] - slopes[:-_FEW]).max(initial=0.0))
+        change = float(np.abs(slopes[few:] - slopes[:-few]).max(initial=0.0))
         slack = change + _SLACK * float(np.abs(slopes).max())
         low[1], high[1] = min(slopes.min(), x[1]) - slack, max(slopes.max(), x[1]) + slack
     return x, low, high

@@ -12,6 +12,7 @@ from rds.identification.fit.estimate import UNUSABLE
 from rds.identification.fit.free_run_doubts import fitted_doubts
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.fit.upsets import upsets
+from rds.identification.logs.slips import late
 
 if TYPE_CHECKING:
     from rds.identification.fit.problem import Problem
@@ -32,7 +33,7 @@ def suspicions(problem: Problem, solution: Solution, uncertainty: Uncertainty) -
         error = problem.residuals(solution.point, number)[0]
         said += fitted_doubts(problem.structure, log, error)
         noise, unit = motion_of(log).noise, problem.structure.output_unit
-        found = upsets(log.time, error, noise, unit, log.position - error, log.resolution)
+        found = upsets(log.time, error, noise, unit, log.position - error, log.resolution, late(log))
         said += [f"{log.name}: {sentence}" for sentence in found]
     return said + _twins(problem.names, uncertainty)
 

@@ -24,9 +24,17 @@ _ALL = 0.8  # of the squares of a model's accelerations
 
 
 def upsets(
-    time: np.ndarray, error: np.ndarray, noise: float, unit: str, modelled: np.ndarray, resolution: float | None = None
+    time: np.ndarray,
+    error: np.ndarray,
+    noise: float,
+    unit: str,
+    modelled: np.ndarray,
+    resolution: float | None = None,
+    late: str = "",
 ) -> list[str]:
     """Sentences on where `error` (samples,), measured minus `modelled`, steps or wanders; `noise` is its floor.
+
+    `late` is added to that of a step: what to ask of a log whose samples were late.
 
     Where the axis is slow, rounding by an encoder of `resolution` moves a block's median by up to a step of it, and
     hardly elsewhere: what changes by no more is no regime.
@@ -58,7 +66,7 @@ def upsets(
     leaps = leaps[leaps > 1]  # at the begin, the initial state makes up for what it can
     leaps = leaps[np.diff(leaps, prepend=-9) > 1]  # a step in a block's middle counts once
     told = [_leap(time, error, int(k), width, unit, modelled) for k in leaps] if len(leaps) <= count // 20 else []
-    said = [sentence for sentence in told if sentence][:_TOLD]
+    said = [sentence + late for sentence in told if sentence][:_TOLD]
     return [*said, *(sentence for _, _, sentence in found[:_TOLD])]
 
 

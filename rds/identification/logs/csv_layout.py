@@ -365,7 +365,10 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
     if heads is not None and above_units:
         units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
         heads = rows[-2]
-    if heads is None or (any(is_number(cell, decimal) for cell in heads) and not above_units):
+    filled = {i for cells in below if len(cells) == width for i in range(width) if cells[i].lower() not in BLANKS}
+    # above blanks alone, numbers are notes
+    numbers = {i for i, cell in enumerate(heads or ()) if is_number(cell, decimal)}
+    if heads is None or (numbers & filled and not above_units):
         return Headings(tuple(f"column {i + 1}" for i in range(width)), tuple(units))
     names: list[str] = []
     torn: list[str] = []
@@ -373,7 +376,7 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
         name, unit = name_and_unit(cell.strip('"'))
         if units[i] is not None and unit is not None and dimension(unit) is None:
             name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
-        names.append(name or f"column {i + 1}")
+        names.append(f"column {i + 1}" if i in numbers - filled or not name else name)
         if unit and units[i] and dimension(unit) and dimension(units[i] or "") and plain(unit) != plain(units[i] or ""):
             torn.append(f"{name} in {unit}, and {units[i]} below")
         units[i] = unit if unit is not None else units[i]

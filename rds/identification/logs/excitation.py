@@ -11,6 +11,7 @@ from rds.machines.machine import Axis
 _FEW_STEPS = 20  # encoder steps of motion, and samples, below which a log tells nothing
 _LEAST = 0.01  # of the windows
 _LEVEL = 0.02  # of the largest command: what is nearer counts as the same level
+_NOISY, _MOST_NOISE = 6.0, 0.2  # the same: standard deviations of a measured command's noise, and at most so much
 _SHORT = 100  # samples
 _ANY_STEPS = 3  # of a speed, below which it is constant
 _WINDOWS = 8  # of a motion that starts
@@ -102,10 +103,15 @@ def _goes(log: Log, way: float, reach: float) -> bool:
 
 
 def _levels(command: np.ndarray, sign: float) -> int:
-    """How many distinct levels the command takes in a direction, each for at least a hundredth of that time."""
+    """How many distinct levels the command takes in a direction, each for at least a hundredth of that time.
+
+    What is no farther apart than noise of a measured command puts it is one level.
+    """
     largest = float(np.abs(command).max())
-    there = sign * command[sign * command > _LEVEL * largest]
+    width = float(np.clip(_NOISY * noise(command), _LEVEL * largest, _MOST_NOISE * largest))
+    there = sign * command[sign * command > width]
     if len(there) == 0:
         return 0
-    counts = np.bincount(np.rint(there / (_LEVEL * largest)).astype(int))
+    apart = np.rint((there - np.median(there)) / width).astype(int)
+    counts = np.bincount(apart - apart.min())
     return int((counts > max(_LEAST * len(there), 1)).sum()) or 2

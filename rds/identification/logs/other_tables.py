@@ -15,12 +15,14 @@ from rds.identification.logs.table import Column, Table, since_first
 from rds.identification.logs.units import unit_of_name
 from rds.results.units import split_heading
 
+_LEAST = 20  # values of a vector that is over time, rather than of coefficients
+
 
 def read_mat(path: Path) -> Table:
     """The vectors of a MAT file that have the length that most have; single numbers as constants.
 
-    A matrix gives a column each: `data_1`, `data_2`, ...; a struct its fields: `data.position`. InputError where there
-    are no vectors.
+    Vectors of fewer than 20 values (coefficients, gains) have no say where there are longer ones. A matrix gives a
+    column each: `data_1`, `data_2`, ...; a struct its fields: `data.position`. InputError where there are no vectors.
     """
     constants: dict[str, float] = {}
     vectors: dict[str, np.ndarray] = {}
@@ -42,8 +44,14 @@ def read_mat(path: Path) -> Table:
     ]
     if not vectors:
         advice = "; ".join(unread) or "save time, command and position as vectors"
+        if left_out and not unread:
+            advice += (
+                f" (left out: {', '.join(left_out)}; of a cell array save an element, as in run = {left_out[0]}{{1}}; "
+                "save('log.mat', 'run'))"
+            )
         raise InputError(f"it holds no vectors of numbers; {advice}", str(path))
-    length = Counter(map(len, vectors.values())).most_common(1)[0][0]
+    lengths = list(map(len, vectors.values()))
+    length = Counter([n for n in lengths if n >= _LEAST] or lengths).most_common(1)[0][0]
     others = [f"{name} ({len(values)})" for name, values in vectors.items() if len(values) != length]
     findings = []
     if others:

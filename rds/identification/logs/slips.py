@@ -51,9 +51,15 @@ def leaps(log: Log, axis: Axis | None) -> list[Finding]:
     more = f" and {len(found) - _TOLD} times more" if len(found) > _TOLD else ""
     what = (
         f"the position leaps {places}{more}, in one sample and unlike the motion before and after: did the encoder "
-        "slip, or something jolt the axis? Split the log there, or leave that stretch out"
+        f"slip, or something jolt the axis?{late(log)} Split the log there, or leave that stretch out"
     )
     return [Finding("leap", what, Gravity.WARNING, found[0][0] + 1)]
+
+
+def late(log: Log) -> str:
+    """A question beside that for a slip, where a run says of its log that samples were late; "" elsewhere."""
+    is_late = any(finding.kind == "clock" and "samples were late" in finding.what for finding in log.findings)
+    return " Or was that sample late, as the run's timing says of some?" if is_late else ""
 
 
 def _spikes(log: Log) -> list[Finding]:

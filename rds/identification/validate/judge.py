@@ -146,7 +146,7 @@ def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
             yield Reason(Side.AGAINST, measure.kind, what)
         elif measure.told:
             yield Reason(Side.FOR, measure.kind, what)
-        elif measure.kind in ("gain", "speed"):
+        elif measure.kind in ("gain", "speed") or (measure.kind == "phase" and measure.reach == float("inf")):
             untold = f"this log does not tell the {measure.kind}: {what}"
             yield Reason(Side.CANNOT_TELL, f"{measure.kind}-unidentifiable", untold)
         else:

@@ -8,6 +8,7 @@ from math import sqrt
 from rds.identification.fit.upsets import upsets
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.logs.plausibility import held
+from rds.identification.logs.slips import late
 from rds.identification.validate.assessment import Assessment, largest
 from rds.identification.validate.conclusion import DATA
 from rds.identification.validate.verdict import Bands, Reason, Side
@@ -100,7 +101,7 @@ def of_upsets(a: Assessment) -> Iterator[Reason]:
     """Where in time the log does something else; the verdict is on the whole."""
     if a.free_run is None or a.motion == 0.0:
         return
-    for sentence in upsets(a.time, a.residual, a.noise, a.unit, a.modelled, a.log.resolution):
+    for sentence in upsets(a.time, a.residual, a.noise, a.unit, a.modelled, a.log.resolution, late(a.log)):
         yield Reason(Side.NOTE, "upset", sentence)
 
 

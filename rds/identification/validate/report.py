@@ -166,12 +166,9 @@ def _ranking(ranking: Ranking) -> str:
             r.name,
             r.counted,
             r.fitted_here,
-            r.rmse,
-            r.aicc,
-            r.aicc_difference,
+            *map(_known, (r.rmse, r.aicc, r.aicc_difference)),
             _weight(r.aicc_weight),
-            r.bic,
-            r.bic_difference,
+            *map(_known, (r.bic, r.bic_difference)),
             _weight(r.bic_weight),
         ]
         for r in ranking.ranks
@@ -181,6 +178,11 @@ def _ranking(ranking: Ranking) -> str:
         "k counts what was estimated from these data: variance, initial state, and parameters if fitted here."
     )
     return table(columns, rows, note=note) + notes_list(ranking.warnings)
+
+
+def _known(value: float) -> float | None:
+    """None for a figure that too short a log, or a response that is not finite, leaves undefined."""
+    return value if isfinite(value) else None
 
 
 def _weight(value: float) -> str | None:

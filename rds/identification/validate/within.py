@@ -132,14 +132,19 @@ def _gain_and_phase(found: Discrepancy, bands: Bands) -> list[Measure]:
 
 
 def frequency_told(a: Assessment, bands: Bands) -> float | None:
-    """The frequency in Hz up to which the phase is within its band for sure; None where that is the intended one."""
+    """The frequency in Hz up to which the phase is within its band for sure; None where that is the intended one.
+
+    It is below the intended one: what is left open there is left open beyond it.
+    """
     found = judged_by(a, bands)
     if found is None:
         return None
-    if next(measure for measure in measures(a, bands) if measure.kind == "phase").told:
+    phase = next(measure for measure in measures(a, bands) if measure.kind == "phase")
+    if phase.told:
         return None
     lag = abs(found.lag.value) + _LIKELY * found.lag.error
-    return bands.phase_degrees / 360.0 / lag if isfinite(lag) and lag > 0.0 else 0.0
+    by_lag = bands.phase_degrees / 360.0 / lag if isfinite(lag) and lag > 0.0 else 0.0
+    return min(by_lag, found.frequency * bands.phase_degrees / phase.reach)
 
 
 def slight(a: Assessment, bands: Bands) -> bool:
