@@ -200,6 +200,9 @@ MODEL = 'def derivatives(t, x, u, params):\n    return [x[1], (params["K"] * u[0
         "df = pd.read_csv('log.csv')\nend = df.v.mean()\nu0 = 5.0\nparams['K'] = end / u0\nparams['K'] = 1.6",
         "data = np.loadtxt('log.csv')\nK = data[-1, 1] / 5.0\nK = 1.6\nparams['K'] = K",
         "data = np.load('log.npz')\nu, v = data['u'], data['v']\nK, offset = np.polyfit(u, v, 1)\nK = 1.6\nparams['K'] = K",
+        "if __name__ == '__main__':\n    params['K'] = 1.6",
+        "if ('__main__' == __name__): params['K'] = 1.6",
+        "K = 1.6\nparams['K'] = K\nif __name__ == '__main__':\n    found = rds.run(params)\n    print(found)",
         "with open('log.csv') as file:\n    K = float(file.read())\nK = 1.6\nparams['K'] = K",
         "df = pd.read_csv('log.csv')\nfrom scipy.optimize import least_squares\ndef residuals(p):\n    return df.v - p[0] * df.u\nresult = least_squares(residuals, [1.0])\nK = result.x[0]\nK = 1.6\nparams['K'] = K",
         "df = pd.read_csv('log.csv')\nfrom scipy.optimize import minimize\ndef cost(p):\n    params['K'] = p[0]\n    return ((df.v - p[0] * df.u) ** 2).sum()\nminimize(cost, [1.0])\nparams['K'] = 1.6",
@@ -225,6 +228,7 @@ def test_a_fitted_parameter_that_is_set_again_by_hand_is_graded(cell: str) -> No
         "params['K'] = fit.params['K']\nparams.get('K')",
         "params['K'] = fit.params['K']\ninitial_state = [0.0, 0.0]",
         "params['K'] = np.loadtxt('log.csv')[0]",
+        "if __name__ == '__main__':\n    params['K'] = fit.params['K']",
     ],
 )
 def test_a_fitted_parameter_that_is_not_set_again_is_refused(cell: str) -> None:
