@@ -197,6 +197,7 @@ MODEL = 'def derivatives(t, x, u, params):\n    return [x[1], (params["K"] * u[0
         "params = dict(fit.params)\nparams = {'K': 1.6, 'tau': 0.01}",
         "params.update(fit.params)\nparams['K'] = 1.6\nparams['tau'] = 0.01",
         "params.update(K=fit.params['K'])\nparams.update({'K': 1.6})",
+        "K, tau = 1.6, 0.01\nfor k in (1.0, 2.0):\n    params['K'] = k\n    rds.run(params)\nparams = {'K': K, 'tau': tau}",
         "df = pd.read_csv('log.csv')\nend = df.v.mean()\nu0 = 5.0\nparams['K'] = end / u0\nparams['K'] = 1.6",
         "data = np.loadtxt('log.csv')\nK = data[-1, 1] / 5.0\nK = 1.6\nparams['K'] = K",
         "data = np.load('log.npz')\nu, v = data['u'], data['v']\nK, offset = np.polyfit(u, v, 1)\nK = 1.6\nparams['K'] = K",

@@ -103,8 +103,8 @@ def mutable(body: Sequence[ast.stmt], known: set[str], functions: Collection[str
             found.add(statement.name)
         for node in chain.from_iterable(map(ast.walk, at_once(statement))):
             targets, value = bound(node)
-            for target in targets:
-                whole = value if isinstance(target, ast.Name) and not isinstance(node, ast.For) else None
+            for target, given in _pairs(targets, value):
+                whole = given if isinstance(target, ast.Name) and not isinstance(node, ast.For) else None
                 for name in stored(target):
                     values.setdefault(name, []).append(whole)
     numbers = set(functions)
@@ -113,6 +113,17 @@ def mutable(body: Sequence[ast.stmt], known: set[str], functions: Collection[str
         numbers |= more
         plain = bool(more)
     return (found | (values.keys() - numbers)) & known
+
+
+def _pairs(targets: Sequence[ast.AST], value: ast.AST | None) -> Iterator[tuple[ast.AST, ast.AST | None]]:
+    """Each target with what is bound to it: `K, tau = 1.6, 0.012` binds two numbers."""
+    for target in targets:
+        parts = target.elts if isinstance(target, ast.Tuple) else []
+        values = value.elts if isinstance(value, ast.Tuple) else []
+        if parts and values and not any(isinstance(each, ast.Starred) for each in (*parts, *values)):
+            yield from zip(parts, values, strict=False)  # of other lengths, it does not run anyhow
+        else:
+            yield target, value
 
 
 def is_plain(value: ast.AST | None, numbers: set[str]) -> bool:

@@ -25,6 +25,7 @@ from rds.grading.intake.bindings import (
     not_there,
     reads_file,
     root,
+    stored,
 )
 from rds.grading.intake.overwritten import is_set_again
 
@@ -167,8 +168,11 @@ def _leave_out(body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent:
     keep.difference_update(unable)
     used = _used(body, makes, keep)
     modules = {name for statement in body for name, _ in imported(statement)}
+    functions = {each.name: each for each in body if isinstance(each, ast.FunctionDef)}
     for number in unable:
-        if not is_set_again(body, keep, number, (makes.facts[number][0] & (used | makes.wanted)) - modules):
+        made = (makes.facts[number][0] & (used | makes.wanted)) - modules
+        made &= mutable(body, made, functions.keys()) | _rebound(body[number], functions)
+        if not is_set_again(body, keep, number, made):
             raise NotFollowed(body[number].lineno, _NEEDS_MORE)
     for number in sorted(keep):  # modules that only these needed
         names = {name for name, _ in imported(body[number])}
@@ -185,6 +189,14 @@ def _able(body: Sequence[ast.stmt], keep: Set[int], absent: Sequence[Set[str]]) 
         if isinstance(body[number], kinds)
         or not (_at_once_names(body[number]) & absent[number] or _reads_file_at_once(body[number]))
     }
+
+
+def _rebound(statement: ast.stmt, functions: Mapping[str, ast.FunctionDef]) -> set[str]:
+    """The names that a statement, or a function that it names, binds anew: a number cannot change in another way."""
+    trees = at_once(statement)
+    named = {each.id for tree in trees for each in ast.walk(tree) if isinstance(each, ast.Name)}
+    found = {name for each in named & functions.keys() for name in _effect(functions[each]).names}
+    return found.union(*(stored(tree) for tree in trees))
 
 
 def _reads_file_at_once(statement: ast.stmt) -> bool:
