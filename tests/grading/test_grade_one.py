@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +20,7 @@ from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.trusted import TrustedFiles
 from rds.grading.batch.grade_one import grade, grade_with_runs
 from rds.grading.grade import Band, CriterionScore, Grade, Status
-from rds.grading.sandbox import Pool
+from rds.grading.sandbox import Limits, Pool
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
 
 STATEFUL = """
@@ -338,3 +342,33 @@ def test_what_it_says_while_a_hidden_case_is_counted_is_withheld(made: Make, poo
     assert found.criteria[0].score == 0.0
     assert "hidden" in found.criteria[0].sentence and "Reference" not in found.criteria[0].sentence
     assert "Reference" in found.details["cases"]["sine"]["counts"][0]["refused"]
+
+
+class _Killed:
+    """A pool whose first submissions are ended by SIGKILL when they are loaded, as somebody outside might do it."""
+
+    def __init__(self, pool: Pool, times: int):
+        self._pool, self.left = pool, times
+        self.counts_work = pool.counts_work
+
+    @contextmanager
+    def open(self, path: str | Path, limits: Limits | None, kind: str) -> Iterator[Any]:
+        with self._pool.open(path, limits, kind) as subject:
+            if self.left:
+                self.left -= 1
+                init = subject._cell._process  # type: ignore[union-attr]
+                own = Path(f"/proc/{init}/task/{init}/children").read_text().split()
+                os.kill(int(own[0]), signal.SIGKILL)
+            yield subject
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="children are found in /proc on Linux alone")
+def test_a_single_kill_of_a_submission_s_own_process_costs_nobody_points(tmp_path: Path, pool: Pool) -> None:
+    """It could have killed itself, but then does so again: once is no zero, twice is its own doing."""
+    folder = assignment_in(tmp_path, HEAD + SINE + RMS)
+    assignment, path = read_assignment(folder), folder / "solution.py"
+    once = _Killed(pool, 1)
+    assert grade(assignment, path, "ada", once) == grade(assignment, path, "ada", pool)
+    assert once.left == 0
+    twice = grade(assignment, path, "ada", _Killed(pool, 2))
+    assert (twice.status, twice.score) == (Status.KILLED, 0.0) and "SIGKILL" in twice.reason

@@ -140,7 +140,7 @@ def test_what_a_notebook_says_is_followed_in_little_memory() -> None:
             'for k in (10.0, 30.0):\n    params["Kp"] = k\n    rds.run(params=params)',
             "cell 2, line 1 .*modules that are not there",
         ),
-        ('best = min((rds.run(Kp=k).rms, k) for k in (1.0, 30.0))\nparams["Kp"] = best[1]', "cell 2, line 1 "),
+        ('best = min((rds.run(Kp=k).rms, k) for k in (1.0, 30.0))\nparams["Kp"] = best[1]', "cell 2, line 2 "),
         ('def best():\n    global params\n    params = {"Kp": rds.run().rms}\nbest()', "cell 2, line 4 "),
         ('def tune():\n    found = rds.run()\n    params["Kp"] = found.rms\ntune()', "cell 2, line 4 "),
     ],
@@ -183,6 +183,61 @@ def test_experiments_that_change_nothing_are_left_out(cell: str) -> None:
     found = made(head, cell)
     assert found["control"](0.0, 0.0, 1.0, None, found["params"])[0] == 30.0  # type: ignore[operator]
     assert not found.keys() & {"experiment", "df", "ys", "run"}
+
+
+FITTED = "import rds\nimport pandas as pd\nimport numpy as np\nparams = {'K': 1.0, 'tau': 0.01}\nfit = rds.fit(rds.read_log('log.csv'), rds.structure('axis'))"
+MODEL = 'def derivatives(t, x, u, params):\n    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]'
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        "K = fit.params['K']\nK = 1.6\nparams['K'] = K",
+        "params['K'] = fit.params['K']\nparams['K'] = 1.6",
+        "params = dict(fit.params)\nparams = {'K': 1.6, 'tau': 0.01}",
+        "params.update(fit.params)\nparams['K'] = 1.6\nparams['tau'] = 0.01",
+        "params.update(K=fit.params['K'])\nparams.update({'K': 1.6})",
+        "K, tau = 1.6, 0.01\nfor k in (1.0, 2.0):\n    params['K'] = k\n    rds.run(params)\nparams = {'K': K, 'tau': tau}",
+        "df = pd.read_csv('log.csv')\nend = df.v.mean()\nu0 = 5.0\nparams['K'] = end / u0\nparams['K'] = 1.6",
+        "data = np.loadtxt('log.csv')\nK = data[-1, 1] / 5.0\nK = 1.6\nparams['K'] = K",
+        "data = np.load('log.npz')\nu, v = data['u'], data['v']\nK, offset = np.polyfit(u, v, 1)\nK = 1.6\nparams['K'] = K",
+        "if __name__ == '__main__':\n    params['K'] = 1.6",
+        "if ('__main__' == __name__): params['K'] = 1.6",
+        "K = 1.6\nparams['K'] = K\nif __name__ == '__main__':\n    found = rds.run(params)\n    print(found)",
+        "with open('log.csv') as file:\n    K = float(file.read())\nK = 1.6\nparams['K'] = K",
+        "df = pd.read_csv('log.csv')\nfrom scipy.optimize import least_squares\ndef residuals(p):\n    return df.v - p[0] * df.u\nresult = least_squares(residuals, [1.0])\nK = result.x[0]\nK = 1.6\nparams['K'] = K",
+        "df = pd.read_csv('log.csv')\nfrom scipy.optimize import minimize\ndef cost(p):\n    params['K'] = p[0]\n    return ((df.v - p[0] * df.u) ** 2).sum()\nminimize(cost, [1.0])\nparams['K'] = 1.6",
+    ],
+)
+def test_a_fitted_parameter_that_is_set_again_by_hand_is_graded(cell: str) -> None:
+    """What led to it (a log, a fit, a cost) need not be there where it is graded."""
+    found = made(FITTED, cell, MODEL)
+    assert found["derivatives"](0.0, [0.0, 1.0], [1.0], found["params"])[1] == pytest.approx(60.0)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        "params['tau'] = fit.params['tau']\nparams['K'] = 1.6",
+        "params.update(fit.params)\nparams['K'] = 1.6",
+        "params['K'], params['tau'] = fit.params.values()\nparams['K'] = 1.6",
+        "params = fit.params\nparams['K'] = 1.6",
+        "params['K'] = fit.params['K']\nparams['K'] *= 2.0",
+        "params['K'] = fit.params['K']\nparams['K'] = 1.1 * params['K']",
+        "params['K'] = fit.params['K']\nparams = {**params, 'tau': 0.02}",
+        "params['tau'] = fit.params['tau']\nparams['K'] = 0.016 / params['tau']\nparams['tau'] = 0.012",
+        "params['K'] = fit.params['K']\nparams.get('K')",
+        "params['K'] = fit.params['K']\ninitial_state = [0.0, 0.0]",
+        "params['K'] = np.loadtxt('log.csv')[0]",
+        "if __name__ == '__main__':\n    params['K'] = fit.params['K']",
+    ],
+)
+def test_a_fitted_parameter_that_is_not_set_again_is_refused(cell: str) -> None:
+    """The first value of `params` was graded in its place, because something else of `params` was set later."""
+    with pytest.raises(
+        Refusal, match=r"cannot be graded as what it ran: cell 2, .*files or modules that are not there"
+    ):
+        converted(notebook(FITTED, cell, MODEL).encode())
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux alone")

@@ -28,6 +28,7 @@ from rds.grading.sandbox.limits import Limits
 
 _LONGEST_OUTPUT = 4000  # characters of what it printed, in the notes
 _MOST_CALLS = 3  # of failing tests, in a sentence
+_MOST_KILLS = 2  # by SIGKILL: from then on the submission is taken to end itself
 _HIDDEN = "in a case that is hidden"
 _ENDED = {
     Status.MISSING: "nothing was handed in",
@@ -126,14 +127,18 @@ def grade_with_runs(
     """Run the submission on every case that `criteria` (default: all) need, and score them.
 
     `seed` stands in for the student's own. What a submission does wrong is in the grade. A case in which it breaks its
-    interface earns nothing, and the others go on; after a limit or a kill nothing more is run. Raises SandboxError
-    where the computer fails: that is to be graded again.
+    interface earns nothing, and the others go on; after a limit or a kill nothing more is run. A submission that was
+    ended by SIGKILL is graded once more: somebody else may have done it. Raises SandboxError where the computer fails:
+    that is to be graded again.
     """
     path = Path(path)
     seed = assignment.seed(student) if seed is None else seed
-    work = _Work(assignment, list(assignment.criteria if criteria is None else criteria), seed)
-    for is_hidden in (False, True):
-        work.go(path, pool, is_hidden)
+    for _ in range(_MOST_KILLS):
+        work = _Work(assignment, list(assignment.criteria if criteria is None else criteria), seed)
+        for is_hidden in (False, True):
+            work.go(path, pool, is_hidden)
+        if not work.may_be_foreign:
+            break
     scores = work.scores()
     before = _rounded(sum(score.score for score in scores))
     days = days_late(assignment.due, submitted)
@@ -175,6 +180,7 @@ class _Work:
         self.details: dict[str, Any] = {}
         self.runs: list[CaseRun] = []
         self.was_opened = True
+        self.may_be_foreign = False  # an end by SIGKILL, which could be somebody else's doing
         self.output = {False: "", True: ""}  # what it printed: where all is visible, and in hidden cases
         self._told = ""  # of a hidden case: what went wrong
         self._failed: dict[str, str] = {}  # by case: why
@@ -254,6 +260,7 @@ class _Work:
     def _blame(self, error: SubmissionError, place: str, is_hidden: bool = False) -> str:
         """Record the first thing that went wrong, and whether more can be run; the reason as a student may read it."""
         said = f"{place}{error.reason}"
+        self.may_be_foreign |= error.may_be_foreign
         if is_hidden:
             self._told = self._told or said
             said = f"{_HIDDEN}: {error.status}"

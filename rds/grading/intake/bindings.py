@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import symtable
 import sys
 from collections.abc import Collection, Iterator, Sequence
 from itertools import chain
@@ -11,6 +12,9 @@ from rds.grading.intake import followed
 from rds.grading.sandbox.packages import ALLOWED
 
 _THERE = frozenset({*sys.stdlib_module_names, *ALLOWED})  # modules that a submission can import
+
+
+_READERS = frozenset({"open", "loadtxt", "genfromtxt", "load", "loadmat", "fromfile"})
 
 
 def imported(statement: ast.stmt) -> Iterator[tuple[str, str]]:
@@ -34,7 +38,7 @@ def not_there(statement: ast.stmt) -> Iterator[str]:
 
 
 def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str]) -> list[frozenset[str]]:
-    """By statement the names that cannot be had there: modules, what uses them, and what was made with all these."""
+    """By statement the names that cannot be had there: modules, what is read from files, and what is made of these."""
     code = {name for statement in body for name in not_there(statement)}
     before = -1
     while before != (before := len(code)):
@@ -44,14 +48,44 @@ def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str]) -> list[frozenset
     found, now = [], frozenset(code)  # most statements have the same: no copy for each
     for statement in body:
         here = now
+        if isinstance(statement, followed.FUNCTIONS):
+            if _used_within(statement) & now or reads_file(statement):
+                now = now | {statement.name} - wanted
+            elif statement.name in now - code:
+                now -= {statement.name}
         for node in chain.from_iterable(map(ast.walk, at_once(statement))):
             targets, value = bound(node)
             names = set(chain.from_iterable(map(stored, targets))) - wanted
-            if value is not None and followed.names_in(value) & now:
+            if value is not None and (followed.names_in(value) & now or reads_file(statement)):
                 now, here = now | names, here | names
             elif isinstance(statement, ast.Assign) and (names - code) & now:
                 now -= names - code
         found.append(here)
+    return found
+
+
+def reads_file(statement: ast.stmt) -> bool:
+    """Whether a statement cannot do without a file that it names: where a notebook is graded there is none."""
+    if isinstance(statement, ast.Try | ast.If):  # with a way out
+        return False
+    calls = (node for node in ast.walk(statement) if isinstance(node, ast.Call) and last_word(node.func) in _READERS)
+    return any(isinstance(each.args[0], ast.Constant) and not _writes(each) for each in calls if each.args)
+
+
+def _writes(opened: ast.Call) -> bool:
+    modes = [*opened.args[1:2], *(word.value for word in opened.keywords if word.arg == "mode")]
+    return last_word(opened.func) == "open" and any(
+        isinstance(mode, ast.Constant) and not str(mode.value).startswith("r") for mode in modes
+    )
+
+
+def _used_within(function: ast.stmt) -> set[str]:
+    """The names of the notebook that a function uses: not its own, which may be called the same."""
+    tables, found = symtable.symtable(ast.unparse(function), "notebook", "exec").get_children(), set()
+    while tables:
+        table = tables.pop()
+        found |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
+        tables += table.get_children()
     return found
 
 
@@ -69,8 +103,8 @@ def mutable(body: Sequence[ast.stmt], known: set[str], functions: Collection[str
             found.add(statement.name)
         for node in chain.from_iterable(map(ast.walk, at_once(statement))):
             targets, value = bound(node)
-            for target in targets:
-                whole = value if isinstance(target, ast.Name) and not isinstance(node, ast.For) else None
+            for target, given in _pairs(targets, value):
+                whole = given if isinstance(target, ast.Name) and not isinstance(node, ast.For) else None
                 for name in stored(target):
                     values.setdefault(name, []).append(whole)
     numbers = set(functions)
@@ -79,6 +113,17 @@ def mutable(body: Sequence[ast.stmt], known: set[str], functions: Collection[str
         numbers |= more
         plain = bool(more)
     return (found | (values.keys() - numbers)) & known
+
+
+def _pairs(targets: Sequence[ast.AST], value: ast.AST | None) -> Iterator[tuple[ast.AST, ast.AST | None]]:
+    """Each target with what is bound to it: `K, tau = 1.6, 0.012` binds two numbers."""
+    for target in targets:
+        parts = target.elts if isinstance(target, ast.Tuple) else []
+        values = value.elts if isinstance(value, ast.Tuple) else []
+        if parts and values and not any(isinstance(each, ast.Starred) for each in (*parts, *values)):
+            yield from zip(parts, values, strict=False)  # of other lengths, it does not run anyhow
+        else:
+            yield target, value
 
 
 def is_plain(value: ast.AST | None, numbers: set[str]) -> bool:

@@ -15,7 +15,19 @@ from dataclasses import dataclass, field
 from itertools import chain
 
 from rds.grading.intake import followed
-from rds.grading.intake.bindings import at_once, bound, from_elsewhere, imported, last_word, mutable, not_there, root
+from rds.grading.intake.bindings import (
+    at_once,
+    bound,
+    from_elsewhere,
+    imported,
+    last_word,
+    mutable,
+    not_there,
+    reads_file,
+    root,
+    stored,
+)
+from rds.grading.intake.overwritten import is_set_again
 
 _OF_LISTS = {"append", "clear", "extend", "fill", "insert", "pop", "put", "remove", "reverse", "sort"}
 _OF_TABLES = {"add", "discard", "popitem", "setdefault", "update"}
@@ -72,13 +84,14 @@ def needed(body: Sequence[ast.stmt], wanted: set[str]) -> tuple[set[int], tuple[
     there_too = [wider[id(names)] for names in absent]
     _follow(body, makes, keep, known, there_too)
     _leave_out(body, makes, keep, there_too)
+    able = _able(body, keep, there_too)
     left_out = set()
     functions = {each.name: each for each in body if isinstance(each, ast.FunctionDef)}
     for number, name in ((n, name) for n, each in enumerate(body) if n not in keep for name in _called(each)):
         if name in elsewhere and elsewhere[name].names & known:
             left_out.add(name)
             given = _from_experiments(functions[name], there_too[number]) & elsewhere[name].names & known
-            if given and not _set_later(body, keep, number, given):
+            if given and not is_set_again(body, able, number, given):
                 raise NotFollowed(body[number].lineno, _NEEDS_MORE)
     return keep, tuple(sorted(left_out))
 
@@ -136,29 +149,75 @@ def _follow(
                     blocked.add(number)
                 elif number not in keep:
                     makes.add(number, keep, known)
+    able = _able(body, keep, absent)
     for number in sorted(blocked):
-        if not _set_later(body, keep, number, makes.wanted | (followed.names_in(body[number]) & seen.data & known)):
+        named = followed.names_in(body[number]) & seen.data & known
+        if not is_set_again(body, able, number, named or makes.wanted & seen.data):
             raise NotFollowed(body[number].lineno, _NEEDS_MORE)
 
 
-_NEEDS_MORE = "it may change what is graded, and needs modules that are not there"
+_NEEDS_MORE = "it may change what is graded, and needs files or modules that are not there"
 
 
 def _leave_out(body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent: Sequence[Set[str]]) -> None:
-    """Leave out what cannot be run, where what it makes is set again later. NotFollowed where it is not."""
-    for number in sorted(keep):
-        statement = body[number]
-        if isinstance(statement, ast.Import | ast.ImportFrom | ast.ClassDef | ast.Try):  # Try: with a way out
-            continue
-        if _at_once_names(statement) & absent[number]:
-            keep.discard(number)
-            if not _set_later(body, keep, number, makes.facts[number][0]):
-                raise NotFollowed(statement.lineno, _NEEDS_MORE)
-    used = set().union(*(makes.facts[number][1] for number in keep))
+    """Leave out what cannot be run, where what it makes is set again later, or used only by what is left out as well.
+
+    NotFollowed where it is neither.
+    """
+    unable = sorted(keep - _able(body, keep, absent))
+    keep.difference_update(unable)
+    used = _used(body, makes, keep)
+    modules = {name for statement in body for name, _ in imported(statement)}
+    functions = {each.name: each for each in body if isinstance(each, ast.FunctionDef)}
+    for number in unable:
+        made = (makes.facts[number][0] & (used | makes.wanted)) - modules
+        made &= mutable(body, made, functions.keys()) | _rebound(body[number], functions)
+        if not is_set_again(body, keep, number, made):
+            raise NotFollowed(body[number].lineno, _NEEDS_MORE)
     for number in sorted(keep):  # modules that only these needed
         names = {name for name, _ in imported(body[number])}
         if any(not_there(body[number])) and names.isdisjoint(used | {"*"}):
             keep.discard(number)
+
+
+def _able(body: Sequence[ast.stmt], keep: Set[int], absent: Sequence[Set[str]]) -> set[int]:
+    """Those of `keep` that need nothing which is not there, or have a way out."""
+    kinds = ast.Import | ast.ImportFrom | ast.ClassDef | ast.Try
+    return {
+        number
+        for number in keep
+        if isinstance(body[number], kinds)
+        or not (_at_once_names(body[number]) & absent[number] or _reads_file_at_once(body[number]))
+    }
+
+
+def _rebound(statement: ast.stmt, functions: Mapping[str, ast.FunctionDef]) -> set[str]:
+    """The names that a statement, or a function that it names, binds anew: a number cannot change in another way."""
+    trees = at_once(statement)
+    named = {each.id for tree in trees for each in ast.walk(tree) if isinstance(each, ast.Name)}
+    found = {name for each in named & functions.keys() for name in _effect(functions[each]).names}
+    return found.union(*(stored(tree) for tree in trees))
+
+
+def _reads_file_at_once(statement: ast.stmt) -> bool:
+    return not isinstance(statement, followed.FUNCTIONS) and reads_file(statement)
+
+
+def _used(body: Sequence[ast.stmt], makes: _Makers, keep: set[int]) -> set[str]:
+    """The names that the statements in `keep` use; functions that none of them uses are taken out of it."""
+    while True:
+        used = set().union(*(makes.facts[number][1] for number in keep))
+        idle = {
+            number
+            for number in keep
+            if isinstance(each := body[number], ast.FunctionDef)
+            and not each.decorator_list
+            and each.name not in makes.wanted
+            and not any(each.name in makes.facts[other][1] for other in keep - {number})
+        }
+        if not idle:
+            return used
+        keep -= idle
 
 
 def _from_experiments(function: ast.FunctionDef, absent: Set[str]) -> set[str]:
@@ -170,10 +229,6 @@ def _from_experiments(function: ast.FunctionDef, absent: Set[str]) -> set[str]:
             if value is not None and followed.names_in(value) & (absent | found):
                 found |= set(map(followed.root, targets)) | set().union(*map(followed.names_in, targets))
     return found
-
-
-def _set_later(body: Sequence[ast.stmt], keep: set[int], number: int, names: set[str]) -> bool:
-    return any(each > number and names & {*_set_by(body[each])} for each in keep)
 
 
 def _at_once_names(statement: ast.stmt) -> set[str]:

@@ -57,7 +57,7 @@ def converted(data: bytes, wanted: Sequence[str] = INTERFACE) -> Converted:
             notes.append(f"cell {number}: {skipped} of IPython's own commands left out")
     text = "\n".join(lines) + "\n"
     try:
-        text = _with_single_imports(text)
+        text = _as_main(_with_single_imports(text))
         body = ast.parse(text).body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         if isinstance(error, SyntaxError) and error.lineno is not None and 2 < error.lineno <= len(lines):
@@ -193,6 +193,20 @@ def _with_single_imports(text: str) -> str:
             one_by_one = "; ".join(ast.unparse(ast.Import([name])) for name in each.names)
             lines[each.lineno - 1] = line[: each.col_offset] + _encoded(one_by_one) + line[each.end_col_offset :]
     return "\n".join(line.decode("utf-8", "surrogatepass") for line in lines)
+
+
+def _as_main(text: str) -> str:
+    """The text with `if True:` in place of `if __name__ == "__main__":`, which holds in a notebook that is run."""
+    lines = text.split("\n")
+    for statement in ast.parse(text).body:
+        if not isinstance(statement, ast.If) or not isinstance(statement.test, ast.Compare):
+            continue
+        test, at = statement.test, statement.lineno - 1
+        if ast.unparse(test) in ("__name__ == '__main__'", "'__main__' == __name__") and test.end_lineno == at + 1:
+            line = _encoded(lines[at])  # columns are counted in bytes
+            line = line[: test.col_offset] + b"True" + line[test.end_col_offset :]
+            lines[at] = line.decode("utf-8", "surrogatepass")
+    return "\n".join(lines)
 
 
 def _only(text: str, body: Sequence[ast.stmt], keep: set[int]) -> str:

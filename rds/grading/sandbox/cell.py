@@ -174,7 +174,9 @@ class Cell:
             raise SandboxError("its sandbox was ended from outside, which no submission can do; grade it again")
         if verdict is None and said == _KILLED and ended_for_memory() > self._budget.ended_for_memory:
             raise SandboxError("the computer ran out of memory and ended processes; grade it again with fewer --jobs")
-        raise SubmissionError(*(verdict or _blame(said)))
+        if verdict is None:
+            raise SubmissionError(*_blame(said), may_be_foreign=said == _KILLED)
+        raise SubmissionError(*verdict)
 
     def close(self) -> None:
         """End all its processes, and forget it."""
