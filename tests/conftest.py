@@ -6,6 +6,7 @@ import ast
 import contextlib
 import gc
 import os
+import re
 import shutil
 import signal
 import tempfile
@@ -52,6 +53,7 @@ HERE = Path(__file__).parent
 PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one
 POLITE = 10  # niceness of the others
 MARK = "pytest.mark.realtime"
+BROWSER = {"app", "browser", "new_page", "open_page", "second_app", "start_app"}  # fixtures of tests/panels/conftest.py
 # They wait for modules' heartbeats or run short and may be late, and follow the panels: both lanes take as long.
 SECOND = ("/oacs/", "/safety/", "/test_readme.py", "/test_notebooks.py", "/test_demo.py")
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
@@ -97,7 +99,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def group_of(nodeid: str) -> str:
     """What a test runs one by one with: those in a browser, those that wait for real time, or those of its file."""
     path, name = nodeid.partition("[")[0].split("::")[:2]
-    if "/panels/" in path:
+    if "/panels/" in path and name in _in_a_browser(path):
         return PANELS
     if name not in _waiting_for_real_time(path):
         return path
@@ -105,15 +107,40 @@ def group_of(nodeid: str) -> str:
 
 
 @cache
+def _body(path: str) -> list[ast.stmt]:
+    return ast.parse((HERE.parent / path).read_text(encoding="utf-8")).body
+
+
+@cache
 def _waiting_for_real_time(path: str) -> frozenset[str]:
     """The functions and classes of a file that are marked `realtime`: all of them where the file itself is."""
-    text = (HERE.parent / path).read_text(encoding="utf-8")
-    if MARK not in text:
+    if MARK not in (HERE.parent / path).read_text(encoding="utf-8"):
         return frozenset()
-    body = ast.parse(text).body
-    named = [node for node in body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
-    is_all = any(MARK in ast.unparse(node) for node in body if node not in named)
+    named = [node for node in _body(path) if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    is_all = any(MARK in ast.unparse(node) for node in _body(path) if node not in named)
     return frozenset(node.name for node in named if is_all or MARK in ast.unparse(node))
+
+
+@cache
+def _in_a_browser(path: str) -> frozenset[str]:
+    """The tests and fixtures of a file that have a page, or `rds app`, from the panels' fixtures or by others of the
+    file. What a file makes once for several tests, of which one is in a browser, takes the others along.
+    """
+    needs, is_shared = {}, set()
+    for node in _body(path):
+        if isinstance(node, ast.FunctionDef):
+            marks = "".join(map(ast.unparse, node.decorator_list))
+            used = re.findall(r"'(\w+)'", marks) if "usefixtures" in marks else []
+            needs[node.name] = {argument.arg for argument in node.args.args} | set(used)
+            if "fixture" in marks and "scope=" in marks:
+                is_shared.add(node.name)
+    found: set[str] = set()
+    while True:
+        more = {name for name, used in needs.items() if used & (BROWSER | found)}
+        more |= {used for name in more for used in needs[name] & is_shared}
+        if more <= found:
+            return frozenset(found)
+        found |= more
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -172,7 +172,10 @@ def test_drives_follow_in_all_modes(mode: str) -> None:
     """Emulation is the simulation bit for bit; the drive on the bus does what its model says."""
     square = {"kind": "square", "amplitude": 1.0, "frequency": 0.5}
     reference, controller = (square, None) if mode == "pp" else (SINE, {"name": "tracking"})
-    runs = experiment(mode, reference, sample_period=0.004, **({"controller": controller} if controller else {}))
+    words: dict[str, Any] = {"sample_period": 0.004, "duration": 1.2} | (
+        {"controller": controller} if controller else {}
+    )
+    runs = experiment(mode, reference, **words)
     simulated, emulated = runs.run("simulation"), runs.run("emulation")
     for column in ("X_reference", "X_measured", "X_command", "X_target"):
         assert np.array_equal(simulated[column], emulated[column]), column

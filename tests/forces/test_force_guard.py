@@ -14,11 +14,12 @@ from rds.nc.run.run import PartProgram
 
 CUT = {"depth": 2.0, "teeth": 2, "diameter": 6.0, "speed": 500.0}
 SQUARE = "G21 G90 G94 G61\nG0 X-5 Y-5\nG1 X5 F300\nY5\nX-5 F150\nY-5\nG0 X0 Y0\nM2\n"
+CORNER = "G21 G90 G94 G61\nG0 X-2 Y-2\nG1 X1 F300\nY0\nM2\n"  # some seconds
 
 
-def part(tmp_path, **words) -> PartProgram:
+def part(tmp_path, text=SQUARE, **words) -> PartProgram:
     path = tmp_path / "part.ngc"
-    path.write_text(SQUARE)
+    path.write_text(text)
     return PartProgram(path, cut=cut_of({**CUT, **words}), sample_period=0.002)
 
 
@@ -64,8 +65,9 @@ def test_the_operator_may_be_slower_but_not_faster(tmp_path):
 
 @pytest.mark.realtime
 def test_emulation_repeats_the_guarded_run_exactly(tmp_path):
-    made = part(tmp_path, limits={"force": 400.0})
+    made = part(tmp_path, CORNER, limits={"force": 400.0})
     simulated, emulated = made.run("simulation"), made.run("emulation", out=tmp_path / "run")
+    assert simulated["program_override"].min() < 0.8  # it is guarded
     for name in ("cutting_force", "program_override", "X_reference"):
         assert np.array_equal(simulated[name], emulated[name]), name
 

@@ -72,10 +72,11 @@ def start_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[...
         raise AssertionError("rds app did not start:\n" + log.read_text())
 
     yield start
-    for app in started:
-        if app.process.poll() is None:
-            os.killpg(app.process.pid, signal.SIGTERM)
-            app.process.wait(20)
+    going = [app.process for app in started if app.process.poll() is None]
+    for process in going:  # they end beside each other
+        os.killpg(process.pid, signal.SIGTERM)
+    for process in going:
+        process.wait(20)
     shutil.rmtree(runtime, ignore_errors=True)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rds.panels.jog import loop
-from tests.panels.conftest import App
+from tests.panels.conftest import App, begin_with
 
 LOSES = """
 window.lost = null; // the kind of words that are lost
@@ -97,3 +97,38 @@ def test_a_hand_that_was_not_heard_is_given_time_to_be_heard_again(
         assert page.locator(".rds-hold-on").count() == 1
         page.evaluate("for (let n = 0; n < 10 && document.querySelector('.rds-hold-on'); n += 1) beat()")
         assert page.locator(".rds-hold-on").count() == 0
+
+
+MISSES = """
+window.deaf = true;
+window.missed = 0; // words that said what the strip draws
+const Heard = window.WebSocket;
+window.WebSocket = class extends Heard {
+  set onmessage(hear) {
+    super.onmessage = (event) => {
+      const text = typeof event.data === "string" ? event.data : new TextDecoder().decode(event.data);
+      if (window.deaf && text.includes('"traces"') && text.includes('"update"')) window.missed += 1;
+      else hear(event);
+    };
+  }
+};
+"""
+
+
+def test_a_strip_that_missed_what_it_draws_asks_again(
+    second_app: App, folders: set[Path], new_page: Callable[..., Any]
+) -> None:
+    """It stayed empty until the end of the run, beside a progress bar that went on."""
+    begin_with(second_app, duration=0.5)
+    page = new_page(1280, 800)
+    folders.add(second_app.folder)
+    page.add_init_script(MISSES)
+    page.goto(second_app.url)
+    page.click('.rds-nav button:text-is("Equipment control")')
+    page.click('button:visible:text-is("Run")')
+    page.wait_for_selector(':text("RMS error"):visible')
+    page.click('.lm-TabBar-tab:visible:has-text("Live")')
+    page.wait_for_function("window.missed > 0 && document.querySelector('.rds-strip').clientWidth")
+    assert page.locator(".rds-strip canvas").count() == 0
+    page.evaluate("window.deaf = false")
+    page.wait_for_selector(".rds-strip canvas:visible")

@@ -4,6 +4,7 @@
 
 const STEP_MS = 80; // a little more often than rows come
 const WHOLE_MS = 400; // between two drawings of a whole run
+const AGAIN_MS = 2000; // between two askings of a page that has missed what is drawn
 const MOST = 3000; // points of a trace that are drawn: more are thinned to their extremes
 const LOWEST = 116; // px of a lane
 const LETTER = 7.7; // px, of an axis's label
@@ -296,6 +297,11 @@ function render({ model, el }) {
   const timer = setInterval(() => {
     if (!follows && speed) { end = Math.min(end + speed * STEP_MS / 1000, last()); dirty = true; }
     const now = performance.now();
+    // it comes in sight with its traces: without them, the page has missed their word
+    if (around && box.clientWidth && !model.get("traces").length && now - asked > AGAIN_MS) {
+      asked = now;
+      model.send({ kind: "all" });
+    }
     if (dirty && el.isConnected && box.clientWidth && (Number.isFinite(wide) || now - drawn > WHOLE_MS)) {
       dirty = false;
       drawn = now;
@@ -338,7 +344,7 @@ function render({ model, el }) {
   themed.observe(document.body, { attributes: true, attributeFilter: ["class", "data-jp-theme-light"] });
   const app = document.querySelector(".rds-app");
   if (app) themed.observe(app, { attributes: true, attributeFilter: ["class", "lang"] });
-  let around = null;
+  let around = null, asked = performance.now();
   const begin = () => { if (around) return; around = place(); around.addEventListener("rds-time", heard); build(); model.send({ kind: "all" }); };
   requestAnimationFrame(begin);
   const late = setTimeout(begin, 250); // a page behind others has no frames
