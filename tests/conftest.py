@@ -33,7 +33,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
     filter(None, (str(Path(__file__).parent / "quick_can"), os.environ.get("PYTHONPATH")))
 )
 
-# Typer builds all commands of `rds` for each line that a test types, at 0.2 s: here once, as each program does.
+# Typer builds all commands of `rds` for each line that a test types, at 0.1 s: here once, as each program does.
 typer.testing._get_command = cache(typer.testing._get_command)
 
 # A shell that runs the tests in the background has them ignore Ctrl-C, and nohup the end of a terminal; so would all
