@@ -242,4 +242,3 @@ def _answers(fit: LawFit, model: Model, T: float, samples: int) -> tuple[np.ndar
         positions.append(y)
         motion.write(u + PULSE if k == 0 else u)
     return np.array(voltages), np.array(positions)
-
