@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer.testing
 from hypothesis import settings
 
 from rds.bus.tools.mf4 import put_off_asammdf
@@ -32,6 +33,9 @@ put_off_asammdf()  # as our programs do: seconds of each worker
 os.environ["PYTHONPATH"] = os.pathsep.join(
     filter(None, (str(Path(__file__).parent / "quick_can"), os.environ.get("PYTHONPATH")))
 )
+
+# Typer builds all commands of `rds` for each line that a test types, at 0.1 s: here once, as each program does.
+typer.testing._get_command = cache(typer.testing._get_command)
 
 # A shell that runs the tests in the background has them ignore Ctrl-C, and nohup the end of a terminal; so would all
 # that they start.

@@ -15,19 +15,18 @@ from __future__ import annotations
 import os
 import re
 import socket
-import sys
+import subprocess
 import threading
 from collections.abc import Generator
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 PRESSURE = Path("/proc/pressure/cpu")  # Linux: pressure stall information
 AGAIN = 2  # times that a failed test is run again, at most
 LONG = 0.1  # s of waiting for a processor that can make a test fail
-
-_STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")  # Python's audit events; of threads it has none before 3.12
 
 _waited_before = pytest.StashKey[float | None]()
 _started = 0  # processes and threads of this worker
@@ -48,16 +47,25 @@ def waited() -> float | None:
 def pytest_configure(config: pytest.Config) -> None:
     """Count what is started, and let a worker's words go at once.
 
+    Not by an audit hook, which Python calls for each import and open, too: 2 % of what the tests compute.
+
     Before each test, a worker of pytest-xdist asks over TCP whether it has crashed there before, in two small words.
     TCP keeps the second one back for 40 ms unless it is told not to: 150 s of this project's tests.
     """
-    sys.addaudithook(lambda event, _: _count() if event in _STARTS else None)
-    start = threading.Thread.start
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(before=_count)
+    begin, start = subprocess.Popen.__init__, threading.Thread.start
+
+    @wraps(begin)
+    def begun(self: subprocess.Popen[Any], *arguments: Any, **options: Any) -> None:
+        _count()
+        begin(self, *arguments, **options)
 
     def counted(self: threading.Thread) -> None:
         _count()
         start(self)
 
+    subprocess.Popen.__init__ = begun  # type: ignore[method-assign]
     threading.Thread.start = counted  # type: ignore[method-assign]
     line = getattr(getattr(config, "failures_db", None), "sock", None)
     if line is not None:

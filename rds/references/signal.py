@@ -21,7 +21,8 @@ class Signal:
     """A signal of one axis: V as a voltage; mm, mm/s and mm/s² as a reference (degrees; rev/min for a spindle).
 
     `motion` gives position, velocity and acceleration at an array of times, which belong together. `settings` says
-    how the signal was made. `voltage` is there where a voltage is not simply the position of that motion.
+    how the signal was made. `voltage` is there where a voltage is not simply the position of that motion, or
+    takes much less time than all of it.
     """
 
     kind: str

@@ -28,7 +28,7 @@ from .chains import MACHINES, chains
 
 pytest.importorskip("numba", reason="numba is not installed: it is in the extra fast")
 
-T = 1e-3
+T = 4e-3  # s: the longest motion below has 40,000 samples so, each of which Python computes
 LIMITS = MACHINES[0]
 
 

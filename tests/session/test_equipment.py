@@ -113,6 +113,7 @@ def test_parameters_are_those_of_the_library_with_their_units(tmp_path: Path) ->
         equipment.choices.set("controller.Pgain", "-1")
 
 
+@pytest.mark.usefixtures("nothing_drawn")
 @pytest.mark.parametrize(
     ("kind", "values"),
     [

@@ -71,6 +71,7 @@ def test_the_panel_says_what_the_shipped_example_says(tmp_path: Path) -> None:
     assert rows.shape[1] == 1 + len(run.traces()) and 0.0 < rows[:, -1].max() < 0.05
 
 
+@pytest.mark.usefixtures("nothing_drawn")
 @pytest.mark.parametrize(
     ("values", "end"),
     [
@@ -96,6 +97,7 @@ def test_several_axes_follow_a_path_to_its_end(tmp_path: Path, values: dict[str,
     assert run.result.meta["program"]["completed"]
 
 
+@pytest.mark.usefixtures("nothing_drawn")
 def test_lines_and_arcs_may_have_files_of_their_own(tmp_path: Path) -> None:
     """mine.py goes straight to the end of any segment, and could not go round."""
     shutil.copy(EXAMPLES / "my_interpolator.py", tmp_path / "arcs.py")
@@ -109,6 +111,7 @@ def test_lines_and_arcs_may_have_files_of_their_own(tmp_path: Path) -> None:
     assert about["completed"] and about["path_error"]["max"] < 1e-9  # mm
 
 
+@pytest.mark.usefixtures("nothing_drawn")
 def test_each_axis_may_follow_the_same_signal(tmp_path: Path) -> None:
     equipment = control(tmp_path, system="X+Y", shape="sinusoid", duration=0.2)
     assert "interpolator" not in equipment.shown and "duration" in equipment.shown and "laps" not in equipment.shown

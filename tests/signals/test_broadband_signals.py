@@ -33,6 +33,11 @@ def test_a_multisine_reaches_its_amplitude_and_no_more() -> None:
     assert np.abs(multisine(10.0, 1.5, 1.5, 16.5).value(fine)).max() == pytest.approx(10.0, rel=1e-6)
 
 
+def test_a_multisine_s_voltage_is_the_position_of_its_motion_to_the_last_bit() -> None:
+    signal, t = multisine(5.0, 0.5, 1.0, 20.0, offset=0.3), np.arange(3000) * 1e-3
+    assert np.array_equal(signal.value(t), signal.motion(t)[0])
+
+
 def test_schroeder_s_phases_keep_the_peak_low() -> None:
     u = sample_voltage(multisine(1.0, 0.5, 0.5, 40.0), 1e-3, 2000)
     assert np.abs(u).max() / np.sqrt(np.mean(u**2)) < 2.0  # equal phases: about 12

@@ -11,11 +11,12 @@ noticed, and deviations are as large as a force on the axis makes them, many cou
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from operator import itemgetter
+from operator import itemgetter, mul
 
 import numpy as np
 
@@ -228,20 +229,16 @@ def closed(fit: LawFit, model: Model, T: float) -> LinearLoop | NoLoop:
 def _answers(fit: LawFit, model: Model, T: float, samples: int) -> tuple[np.ndarray, np.ndarray]:
     motion = start(model, T)
     a, b = fit.a[1:].tolist(), fit.b.tolist()
-    last_u, last_y = [0.0] * len(a), [0.0] * len(b)
+    last_u, last_y = deque([0.0] * len(a), len(a)), deque([0.0] * len(b), len(b))  # the latest first
     voltages, positions = [], []
     for k in range(samples):
         y = motion.read()
-        last_y = [y, *last_y[:-1]]
-        u = _dot(b, last_y) - _dot(a, last_u)
-        last_u = [u, *last_u][: len(a)]
+        last_y.appendleft(y)
+        u = sum(map(mul, b, last_y)) - sum(map(mul, a, last_u))
+        last_u.appendleft(u)
         if not abs(y) < _FAR:
             break
         voltages.append(u)
         positions.append(y)
         motion.write(u + PULSE if k == 0 else u)
     return np.array(voltages), np.array(positions)
-
-
-def _dot(factors: Iterable[float], values: Iterable[float]) -> float:
-    return sum(factor * value for factor, value in zip(factors, values, strict=True))
