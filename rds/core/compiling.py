@@ -15,7 +15,7 @@ from functools import cache
 from math import inf
 from pathlib import Path
 from threading import local
-from time import perf_counter
+from time import thread_time
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -31,7 +31,8 @@ except ImportError:  # the extra is not installed
 else:
     COMPILED = not vars(config)["DISABLE_JIT"]  # which a user sets to look into a kernel
 
-LONG = 20.0  # s that tiered kernels run in Python before one is compiled
+# s of processor time that tiered kernels run in Python before one is compiled: a busy computer makes no program long
+LONG = 20.0
 LOADED = 0.1  # s, the same of a compiled one that is kept on disk: loading all of them takes some 0.4 s
 _AGAIN = 0.5  # s in Python, after which they are looked for on disk again
 _COMPILING = "the planner is being compiled, because this motion is long: that takes some 40 s, once"
@@ -86,7 +87,7 @@ class TieredKernel:
         self._look()
 
     def __call__(self, *values: Any, **named: Any) -> Any:
-        of, now = TieredKernel, perf_counter()
+        of, now = TieredKernel, thread_time()
         since = of.within.since
         spent = of.spent + (now - since if since else 0.0)
         if not self.is_kept and LOADED <= spent < LONG:
@@ -104,7 +105,7 @@ class TieredKernel:
             return copy_context().run(self._silently, *values, **named)
         finally:
             of.within.since = 0.0
-            of.spent += perf_counter() - now
+            of.spent += thread_time() - now
 
     def _look(self) -> None:
         # Each for itself: while another process compiles them, or after it was interrupted, only some are there.
