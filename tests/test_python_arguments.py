@@ -9,12 +9,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import control
 import numpy as np
+import pandas
 import pytest
 from typer.testing import CliRunner
 
 import rds
 from rds.cli.main import app
+from rds.interpolators.acceleration import make_acceleration
 from rds.machines.machine import load_machine as loaded
 from rds.nc import Setup
 from rds.nc.language.dialect import Dialect
@@ -182,6 +185,31 @@ def test_a_law_is_designed_for_what_a_fit_found(fitted: tuple[rds.Log, Any], tmp
     assert rds.design(estimate).params == rds.design(tmp_path / "fitted.toml").params
 
 
+STEP = rds.LineSegment((0.0, 0.0), (2.0, 1.0), 10.0)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_filter_and_a_voltage_may_be_given_as_elsewhere() -> None:
+    named = rds.interpolate(STEP, 1e-3, acceleration="linear")
+    assert (named.position == rds.interpolate(STEP, 1e-3, acceleration=make_acceleration("linear")).position).all()
+
+    def law(t: float, r: rds.Reference, y: float, state: Any, params: Any) -> tuple[Any, Any]:
+        return pandas.Series([30.0 * (r.position - y)]), state
+
+    plan = rds.Experiment(reference=rds.sinusoid(5.0, 2.0), controller=law, duration=0.5)
+    assert rds.compare(plan.run(), short().run()).identical
+
+
+def test_a_signal_that_fails_names_its_line() -> None:
+    def steep(t: float) -> float:
+        return 1.0 / t
+
+    with pytest.raises(
+        rds.ContractError, match=r"fails at t = 0 s: test_python_arguments.py, line \d+, in steep: Zero"
+    ):
+        rds.Experiment(reference=steep, controller="pid", duration=0.1).run()
+
+
 class Framed:
     """As a table of pandas, which has axes, too."""
 
@@ -207,6 +235,15 @@ def test_what_is_not_what_it_should_be_is_named(fitted: tuple[rds.Log, Any]) -> 
         "Framed'> is no result; rds.open_result": lambda: rds.compare(Framed, Framed),
         "<Log run: .* is no result; rds.open_result": lambda: rds.compare(log, log),
         "poles = -30 must be a list": lambda: rds.design(estimate, poles=-30),
+        "<Result: .* is no log; rds.read_log": lambda: rds.fit(rds.open_result(log.source), "axis"),
+        r"options = \['viscous'\] must be a dict": lambda: rds.fit(log, "axis", options=["viscous"]),  # type: ignore
+        "a TransferFunction of python-control is no fitted axis": lambda: rds.design(control.tf([1.0], [1.0, 0.0])),
+        r"control\(t, r, y\) cannot be called as control\(t, r, y, state, params\)": lambda: rds.Experiment(
+            reference=rds.constant(1.0), controller=lambda t, r, y: (r.position - y, ())
+        ).run(),
+        "dict: it defines none of control": lambda: rds.Experiment(reference=rds.constant(1.0), controller=dict).run(),
+        r"interpolate\(\) returned None, and no rows": lambda: rds.interpolate(STEP, 1e-3, lambda s, T, p: None),
+        "there is no model 'linear_axis'; .*did you mean 'linear-axis'": lambda: rds.library_model("linear_axis"),
         "is no structure; give its name": lambda: rds.fit(log, 3),
         "structure axis has no option 'viscus'": lambda: rds.structure("axis", "viscus"),
         "'part.ngc' is no LineSegment": lambda: rds.interpolate("part.ngc", 1e-3),
