@@ -84,6 +84,8 @@ def _text(exc: BaseException) -> str:
     text = text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
     if isinstance(exc, TypeError | AttributeError) and "'Reference'" in text:
         return f"{text} (r.position, r.velocity and r.acceleration are its numbers)"
+    if type(exc) is TypeError and "for ^: " in text:
+        return f"{text} (a power is written **)"
     if isinstance(exc, AttributeError) and _OF_REFERENCE.search(text):
         return f"{text} (r has it; y is the position itself)"
     if isinstance(exc, TypeError | ValueError) and any(said in text for said in _ARRAYS_AS_NUMBERS):
