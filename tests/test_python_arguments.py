@@ -290,3 +290,18 @@ def test_a_command_takes_the_place_of_its_own_file_only(
     for _ in range(2):
         done = CliRunner().invoke(app, words)
         assert done.exit_code == 0, done.output
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("report accuracy nope.csv", "nope.csv: there is no such file; check the name of the file"),
+        ("report accuracy .", ".: is a folder; check the name of the file"),
+        ("forces mini-cnc part.ngc", "the cut (options such as --depth 1.0, or a file by --cut): depth is missing"),
+        ("jobs send {} --socket jobs.sock", "jobs.sock; start one by `rds jobs serve FOLDER` in another terminal"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_what_a_command_lacks_is_named(command: str, said: str) -> None:
+    refused = CliRunner().invoke(app, command.split())
+    assert refused.exit_code == 2 and said in refused.stderr, refused.output
