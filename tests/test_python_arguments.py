@@ -233,6 +233,7 @@ def test_what_is_not_what_it_should_be_is_named(fitted: tuple[rds.Log, Any]) -> 
         "3 is no log": lambda: rds.frequency_response(3),
         "2 logs are given, and one is wanted": lambda: rds.compare_models([estimate, estimate], [log, log]),
         "Framed'> is no result; rds.open_result": lambda: rds.compare(Framed, Framed),
+        "None is no result; rds.open_result": lambda: rds.open_result(log.source).compare(None),  # type: ignore
         "<Log run: .* is no result; rds.open_result": lambda: rds.compare(log, log),
         "poles = -30 must be a list": lambda: rds.design(estimate, poles=-30),
         "<Result: .* is no log; rds.read_log": lambda: rds.fit(rds.open_result(log.source), "axis"),
@@ -305,3 +306,14 @@ def test_a_command_takes_the_place_of_its_own_file_only(
 def test_what_a_command_lacks_is_named(command: str, said: str) -> None:
     refused = CliRunner().invoke(app, command.split())
     assert refused.exit_code == 2 and said in refused.stderr, refused.output
+
+
+def test_a_table_of_somebody_else_s_is_not_replaced_by_a_run_s(here: Path) -> None:
+    (here / "mine").mkdir()
+    (here / "mine" / "result.csv").write_text("time,position\n0,0\n")
+    with pytest.raises(rds.InputError, match=r"mine/result.csv: is there already, and is no result of a run; name ano"):
+        short().run(out="mine")
+    assert (here / "mine" / "result.csv").read_text() == "time,position\n0,0\n"
+    short().run(out="ours")
+    (here / "ours" / "result.json").unlink()
+    assert short().run(out="ours").length == 0.5
