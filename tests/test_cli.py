@@ -438,3 +438,12 @@ def test_no_help_loses_a_word_in_brackets() -> None:
         seen += 1
         lost += [f"{name}: {found[0]}" for text in texts for found in markup.finditer(known.sub("", text or ""))]
     assert seen > 60 and not lost, lost
+
+
+def test_a_model_that_overflows_is_told_without_lines_of_the_package(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def derivatives(t, x, u, params):\n    return [x[1], 1e9 * (u[0] - x[1])]\n")
+    words = 'axis = "X"\nduration = 0.1\n[signal]\nkind = "constant"\nvalue = 2.0\n[model]\nfile = "mine.py"\n'
+    (tmp_path / "loop.toml").write_text(words)
+    done = command("run", str(tmp_path / "loop.toml"), "--out", str(tmp_path / "out"))
+    assert done.returncode == 2 and "the model's position became" in done.stderr
+    assert "integrate.py" not in done.stderr

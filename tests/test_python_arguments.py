@@ -9,12 +9,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import control
 import numpy as np
+import pandas
 import pytest
 from typer.testing import CliRunner
 
 import rds
 from rds.cli.main import app
+from rds.interpolators.acceleration import make_acceleration
 from rds.machines.machine import load_machine as loaded
 from rds.nc import Setup
 from rds.nc.language.dialect import Dialect
@@ -182,6 +185,31 @@ def test_a_law_is_designed_for_what_a_fit_found(fitted: tuple[rds.Log, Any], tmp
     assert rds.design(estimate).params == rds.design(tmp_path / "fitted.toml").params
 
 
+STEP = rds.LineSegment((0.0, 0.0), (2.0, 1.0), 10.0)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_filter_and_a_voltage_may_be_given_as_elsewhere() -> None:
+    named = rds.interpolate(STEP, 1e-3, acceleration="linear")
+    assert (named.position == rds.interpolate(STEP, 1e-3, acceleration=make_acceleration("linear")).position).all()
+
+    def law(t: float, r: rds.Reference, y: float, state: Any, params: Any) -> tuple[Any, Any]:
+        return pandas.Series([30.0 * (r.position - y)]), state
+
+    plan = rds.Experiment(reference=rds.sinusoid(5.0, 2.0), controller=law, duration=0.5)
+    assert rds.compare(plan.run(), short().run()).identical
+
+
+def test_a_signal_that_fails_names_its_line() -> None:
+    def steep(t: float) -> float:
+        return 1.0 / t
+
+    with pytest.raises(
+        rds.ContractError, match=r"fails at t = 0 s: test_python_arguments.py, line \d+, in steep: Zero"
+    ):
+        rds.Experiment(reference=steep, controller="pid", duration=0.1).run()
+
+
 class Framed:
     """As a table of pandas, which has axes, too."""
 
@@ -205,8 +233,18 @@ def test_what_is_not_what_it_should_be_is_named(fitted: tuple[rds.Log, Any]) -> 
         "3 is no log": lambda: rds.frequency_response(3),
         "2 logs are given, and one is wanted": lambda: rds.compare_models([estimate, estimate], [log, log]),
         "Framed'> is no result; rds.open_result": lambda: rds.compare(Framed, Framed),
+        "None is no result; rds.open_result": lambda: rds.open_result(log.source).compare(None),  # type: ignore
         "<Log run: .* is no result; rds.open_result": lambda: rds.compare(log, log),
         "poles = -30 must be a list": lambda: rds.design(estimate, poles=-30),
+        "<Result: .* is no log; rds.read_log": lambda: rds.fit(rds.open_result(log.source), "axis"),
+        r"options = \['viscous'\] must be a dict": lambda: rds.fit(log, "axis", options=["viscous"]),  # type: ignore
+        "a TransferFunction of python-control is no fitted axis": lambda: rds.design(control.tf([1.0], [1.0, 0.0])),
+        r"control\(t, r, y\) cannot be called as control\(t, r, y, state, params\)": lambda: rds.Experiment(
+            reference=rds.constant(1.0), controller=lambda t, r, y: (r.position - y, ())
+        ).run(),
+        "dict: it defines none of control": lambda: rds.Experiment(reference=rds.constant(1.0), controller=dict).run(),
+        r"interpolate\(\) returned None, and no rows": lambda: rds.interpolate(STEP, 1e-3, lambda s, T, p: None),
+        "there is no model 'linear_axis'; .*did you mean 'linear-axis'": lambda: rds.library_model("linear_axis"),
         "is no structure; give its name": lambda: rds.fit(log, 3),
         "structure axis has no option 'viscus'": lambda: rds.structure("axis", "viscus"),
         "'part.ngc' is no LineSegment": lambda: rds.interpolate("part.ngc", 1e-3),
@@ -253,3 +291,29 @@ def test_a_command_takes_the_place_of_its_own_file_only(
     for _ in range(2):
         done = CliRunner().invoke(app, words)
         assert done.exit_code == 0, done.output
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("report accuracy nope.csv", "nope.csv: there is no such file; check the name of the file"),
+        ("report accuracy .", ".: is a folder; check the name of the file"),
+        ("forces mini-cnc part.ngc", "the cut (options such as --depth 1.0, or a file by --cut): depth is missing"),
+        ("jobs send {} --socket jobs.sock", "jobs.sock; start one by `rds jobs serve FOLDER` in another terminal"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_what_a_command_lacks_is_named(command: str, said: str) -> None:
+    refused = CliRunner().invoke(app, command.split())
+    assert refused.exit_code == 2 and said in refused.stderr, refused.output
+
+
+def test_a_table_of_somebody_else_s_is_not_replaced_by_a_run_s(here: Path) -> None:
+    (here / "mine").mkdir()
+    (here / "mine" / "result.csv").write_text("time,position\n0,0\n")
+    with pytest.raises(rds.InputError, match=r"mine/result.csv: is there already, and is no result of a run; name ano"):
+        short().run(out="mine")
+    assert (here / "mine" / "result.csv").read_text() == "time,position\n0,0\n"
+    short().run(out="ours")
+    (here / "ours" / "result.json").unlink()
+    assert short().run(out="ours").length == 0.5

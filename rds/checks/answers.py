@@ -59,8 +59,11 @@ def _no_pair(answer: Any) -> tuple[str, str]:
 
 def _number_fault(u: Any) -> tuple[str, str, str] | None:
     if is_real(u):
-        if isfinite(u):
-            return None
+        try:
+            if isfinite(u):
+                return None
+        except OverflowError:  # a whole number of hundreds of digits
+            return clauses.VOLTAGE, f"the voltage {shown(u)}", "return a number that is not above 1e308 V"
         return clauses.VOLTAGE, f"the voltage {u}", "look for a division by zero, a root or a logarithm"
     said = f"the voltage {shown(u)} ({type(u).__name__})"
     if isinstance(u, np.ndarray) and u.size == 1:

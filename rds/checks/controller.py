@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Mapping
+from numbers import Number
 from typing import Any
 
 import numpy as np
@@ -171,7 +172,8 @@ class _Run:
         fault = voltage_fault(answer, self.axes, self.signals)
         if fault is not None:
             clause, said, remedy = fault
-            if not self.axes and not self.calls and self._works_with_arrays():
+            is_number = isinstance(answer, tuple | list) and bool(answer) and isinstance(answer[0], Number)
+            if not self.axes and not self.calls and not is_number and self._works_with_arrays():
                 remedy += f"; or, as {_SEVERAL}"
             self.found.fault(clause, f"control() returned {said} at t = {t:.3f} s; {remedy}")
         return fault is None

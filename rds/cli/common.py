@@ -24,6 +24,8 @@ import typer
 from rds.core.private_files import keep_process_private, share
 from rds.core.quantities import Quantity
 
+_PACKAGE = Path(__file__).resolve().parents[1]
+
 
 def declared(quantity: Quantity, help: str = "") -> Any:
     """The option of a quantity: its meaning, unit and range, from its declaration. `help` adds to the meaning."""
@@ -103,8 +105,8 @@ def say_notices() -> None:
     def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
         if issubclass(category, Notice):
             typer.echo(f"rds: note: {message}", err=True)
-        else:
-            shown(message, category, *where, **more)
+        elif not (issubclass(category, RuntimeWarning) and Path(where[0]).is_relative_to(_PACKAGE)):
+            shown(message, category, *where, **more)  # a line of ours that overflows is told by what comes of it
 
     warnings.showwarning = show
 

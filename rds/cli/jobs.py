@@ -62,11 +62,19 @@ def send(
 ) -> None:
     """Send requests to the server, one after the other, and print its answers; exit code 1 if one is a refusal."""
     with refusals():
+        from rds.core.errors import MachineError
         from rds.jobs.address import Address
         from rds.jobs.client import Client
 
         fine = True
-        with Client(Address.of(socket, port, secret)) as client:
+        address = Address.of(socket, port, secret)
+        try:
+            client = Client(address)
+        except OSError as error:
+            place = address.path or f"127.0.0.1:{address.port}"
+            remedy = "start one by `rds jobs serve FOLDER` in another terminal, or name its --socket or --port"
+            raise MachineError(f"no server of jobs answers at {place}; {remedy}") from error
+        with client:
             for request in requests:
                 for line, answered in client.ask(request):
                     typer.echo(line)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import linecache
+import re
 import sysconfig
 from pathlib import Path
 from traceback import FrameSummary, extract_tb
@@ -13,6 +14,7 @@ STUDENT_ERRORS = (Exception, SystemExit)
 """What a student's code may raise and its caller answers for; Ctrl-C is the user's."""
 
 _ARRAYS_AS_NUMBERS = ("only 0-dimensional arrays can be converted", "inhomogeneous shape")  # numpy's words
+_OF_REFERENCE = re.compile(r"'float' object has no attribute '(?:position|velocity|acceleration)'")
 _LONGEST = 300  # characters of an exception's own text; some print whole arrays
 
 
@@ -80,8 +82,12 @@ def _text(exc: BaseException) -> str:
     except STUDENT_ERRORS:  # an exception class of the student's own may fail to print itself
         text = "(its message cannot be printed)"
     text = text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
-    if type(exc) is TypeError and "'Reference'" in text:
+    if isinstance(exc, TypeError | AttributeError) and "'Reference'" in text:
         return f"{text} (r.position, r.velocity and r.acceleration are its numbers)"
+    if type(exc) is TypeError and "for ^: " in text:
+        return f"{text} (a power is written **)"
+    if isinstance(exc, AttributeError) and _OF_REFERENCE.search(text):
+        return f"{text} (r has it; y is the position itself)"
     if isinstance(exc, TypeError | ValueError) and any(said in text for said in _ARRAYS_AS_NUMBERS):
         return f"{text} (of an array of one number, such as a model's u, [0] is the number)"
     return f"{text} (the dict has no such key)" if type(exc) is KeyError else text  # its own text is the key alone

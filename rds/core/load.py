@@ -23,6 +23,7 @@ from rds.core.blame import STUDENT_ERRORS, student_error, student_line
 from rds.core.errors import ContractError, InputError
 from rds.core.folder_kept import folder_kept
 from rds.core.interrupt import Endless, limited
+from rds.core.quantities import near
 from rds.core.signals import declaration_fault
 from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near_misses
 from rds.core.types import Controller, Reference, Source
@@ -74,7 +75,11 @@ class StudentFile:
         for key, value in (overrides or {}).items():
             if key not in merged:
                 known = ", ".join(map(str, merged)) or "none"
-                raise InputError(f"unknown parameter {key!r}; known parameters: {known}", self.source.name)
+                hint = near(key, [str(name) for name in merged])
+                raise InputError(f"{self.source.name}: unknown parameter {key!r}; known parameters: {known}{hint}")
+            if isinstance(value, str) and type(merged[key]) in _NUMBERS:
+                said = f"must be a number, without quotes, as the file's own {merged[key]!r:.60} is"
+                raise InputError(f"{self.source.name}: parameter {key} = {value!r:.60} {said}")
             merged[key] = value
         return merged
 
@@ -257,7 +262,10 @@ def wants_state(error: BaseException, call: Callable[[Any], Any], source: Source
 def _role_of(function: Callable[..., Any], name: str) -> str:
     fits = [role for role in INTERFACES if argument_fault(role, function) is None]
     if len(fits) > 1:  # derivatives and advance both take four
-        names = set(inspect.signature(function).parameters)
+        try:
+            names = set(inspect.signature(function).parameters)
+        except (TypeError, ValueError):  # built-in classes and functions need not tell
+            names = set()
         fits = [role for role in fits if names >= set(ARGUMENTS[role])] or fits
     if len(fits) != 1:
         forms = ", ".join(form(role) for role in INTERFACES)

@@ -23,6 +23,8 @@ from typing import Any, NamedTuple, Protocol
 
 from rds.core.errors import InputError
 
+_BEGINNING = 3  # letters by which a word is taken for another that begins alike
+
 
 class Declaration(Protocol):
     """What a value may be."""
@@ -68,8 +70,18 @@ def listed(values: Mapping[str, Any], most: int = 8) -> str:
 
 def near(word: Any, known: Sequence[str]) -> str:
     """The hint at the known word that is nearest to `word`; empty if none is near."""
-    close = get_close_matches(str(word), known, n=1)
-    return f"; did you mean '{close[0]}'?" if close else ""
+    meant = _nearest(str(word), known)
+    return f"; did you mean '{meant}'?" if meant else ""
+
+
+def _nearest(word: str, known: Sequence[str]) -> str | None:
+    """The same word in capital or small letters; else a near one that begins alike, one that does, or a near one."""
+    close = get_close_matches(word, known, n=3)
+    same = [name for name in known if name.casefold() == word.casefold()]
+    alike = [name for name in known if len(word) >= _BEGINNING and name[:_BEGINNING] == word[:_BEGINNING]]
+    both = [name for name in close if name in alike]
+    meant = same or both or (alike if len(alike) == 1 else close)
+    return meant[0] if meant else None
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from importlib import import_module
 from types import ModuleType
 
 from rds.core.errors import InputError
+from rds.core.quantities import near
 
 
 @dataclass(frozen=True)
@@ -26,5 +27,6 @@ class Registry:
         """The module called `name`, imported now if it was not before; InputError lists the known names."""
         if name not in self.modules:
             own = ", or your own from a file" if self.own else ""
-            raise InputError(f"there is no {self.kind} {name!r}; known {self.kind}s: {', '.join(self.modules)}{own}")
+            known = f"known {self.kind}s: {', '.join(self.modules)}{own}"
+            raise InputError(f"there is no {self.kind} {name!r}; {known}{near(name, self.names())}")
         return import_module(self.modules[name])

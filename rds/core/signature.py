@@ -62,6 +62,8 @@ def near_misses(namespace: Mapping[str, Any]) -> str:
     """A sentence about what in `namespace` was probably meant as an interface function, or ""."""
     for name, value in namespace.items():
         if isinstance(value, type):
+            if name in INTERFACES:
+                return f"its `{name}` is a class; write a function, `def {form(name)}`"
             for method in INTERFACES:
                 if callable(getattr(value, method, None)):
                     return f"class {name} has a method {method}(); make it a plain function outside of any class"

@@ -21,12 +21,16 @@ DEEPEST = 64  # tables and arrays in each other
 LONGEST_KEY = 200  # characters
 _LONG = re.compile(r"[+-]?(?:0x[0-9a-fA-F_]{16,}|0o[0-7_]{21,}|0b[01_]{63,}|[0-9][0-9_]{18,})")
 _RULES = "; texts stand in quotation marks, numbers have a point and no unit"
+_BACKSLASH = "; a backslash in double quotation marks begins a special character: write / in its place"
 _REMEDIES = {  # by what tomllib says
     "Invalid value": _RULES,
     "Expected newline": _RULES,
     "Cannot overwrite": "; it stands there twice: remove one of them",
     "twice": "; remove one of them",
     "Unterminated string": "; end it with a quotation mark",
+    "Illegal character '\\n'": "; a text ends in its line with a quotation mark",
+    "Invalid hex value": _BACKSLASH,
+    "Unescaped '\\' in a string": _BACKSLASH,
 }
 _WHOLE = 2**63  # TOML's whole numbers have 64 bits
 # Texts and comments are a token each, closed or not: no dot in them counts, no character is looked at twice.

@@ -34,6 +34,7 @@ class TomlTable:
         self._text, self._general, self._shared = text, general, shared
         self.lines_before = lines_before  # of the file, above `text`, for the lines in errors
         self._asked: list[str] = []
+        self._top = declared if not name else None  # what the file's own keys are, above its tables
 
     def over_written(self, table: dict[str, Any]) -> TomlTable:
         """The same file with another top table: errors still tell the file's places."""
@@ -109,7 +110,14 @@ class TomlTable:
         tables = [self] if self._general is None else [self, self._general]
         others = [name for table in tables for name in table.table if name not in table._asked]
         close = get_close_matches(key, others, n=1)
-        return f"; is '{close[0]}' meant to be it?" if close else ""
+        if close:
+            return f"; is '{close[0]}' meant to be it?"
+        for name, value in self.table.items():
+            if not self.name and isinstance(value, dict) and key in value:
+                line = _line_of(self._text, name, key)
+                where = f" in line {line}" if line else ""
+                return f"; the one{where} belongs to [{name}]: move it above the first [table]"
+        return ""
 
     def _of(self, key: str) -> Declaration:
         assert self.declared is not None, f"{key} is read from a table without a declaration"
@@ -117,9 +125,11 @@ class TomlTable:
 
     def over(self, general: TomlTable, shared: Sequence[str]) -> TomlTable:
         """This table, and `general` behind it for the keys in `shared`."""
-        return TomlTable(
+        made = TomlTable(
             self.table, self.declared, self._text, self.path, self.name, general, shared, self.lines_before
         )
+        made._top = self._top
+        return made
 
     def _owner(self, key: str | None) -> TomlTable:
         """The table in which `key` stands."""
@@ -158,7 +168,9 @@ class TomlTable:
         """A table that stands for the value of `key`."""
         owner = self._owner(key)
         name, declared = owner.full_name(key), self._declared_under(key)
-        return TomlTable(table, declared, owner._text, owner.path, name, lines_before=owner.lines_before)
+        made = TomlTable(table, declared, owner._text, owner.path, name, lines_before=owner.lines_before)
+        made._top = owner._top
+        return made
 
     def _declared_under(self, key: str) -> Table | None:
         """The declaration of the table, or of each table, that `key` holds; None where it has none of its own."""
@@ -175,9 +187,11 @@ class TomlTable:
         for key in self.table:
             if key not in known:
                 table = f" in [{self.name}]" if self.name else ""
+                hint = near(key, known)
+                if self.name and self._top is not None and key in self._top.keys:
+                    hint = f"; if the file's own '{key}' is meant, move it above the first [table]"
                 raise InputError(
-                    f"unknown key '{key}'{table}; known keys: {', '.join(sorted(known))}{near(key, known)}",
-                    self.place(key),
+                    f"unknown key '{key}'{table}; known keys: {', '.join(sorted(known))}{hint}", self.place(key)
                 )
 
 

@@ -53,11 +53,11 @@ class Interpolator:
 
     def interpolate(self, segment: Segment, T: float) -> Rows:
         """Its rows (mm, mm/s, mm/s²) every `T` s."""
-        yield from self.function(segment, T, dict(self.params))
+        yield from self._called(self.function, segment, T)
 
     def theoretical(self, segment: Segment, T: float) -> Rows:
         """Its rows before positions are made whole BLU."""
-        yield from (self.theory or self.function)(segment, T, dict(self.params))
+        yield from self._called(self.theory or self.function, segment, T)
 
     def rows(self, segment: Segment, T: float) -> np.ndarray:
         """Its theoretical rows as an array of shape (rows, 3, axes); errors as of `each`."""
@@ -103,12 +103,20 @@ class Interpolator:
             return None
         return steps(segment, self.params, self.word, T)
 
+    def _called(self, function: Callable[..., Any], segment: Segment, T: float) -> Rows:
+        rows: Any = function(segment, T, dict(self.params))
+        if not isinstance(rows, Iterable):
+            raise self._broken(f"returned {rows!r:.60}, and no rows: yield each of them, or return them as a list")
+        return iter(rows)
+
     def _errors(self, segment: Segment) -> Callable[[Rows], Rows]:
         return (lambda rows: rows) if self.source.path is None else partial(self._blamed, segment)
 
     def _blamed(self, segment: Segment, rows: Rows) -> Rows:
         try:
             yield from rows
+        except ContractError:
+            raise
         except STUDENT_ERRORS as error:
             kind = type(segment).__name__
             raise self._broken(f"failed for {kind}: {student_error(error, self.source)}") from error
@@ -144,7 +152,7 @@ def as_interpolator(given: Any) -> Interpolator:
     if isinstance(given, str | Path):
         return find_interpolator(str(given))
     if callable(given):
-        return from_student(from_function(given))
+        return from_student(from_function(given, role="interpolate"))
     raise InputError(f"{shortened(given)} is no interpolator; give a name of the library, a .py file, or a function")
 
 

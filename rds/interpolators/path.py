@@ -13,7 +13,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.interpolators import DEFAULT
-from rds.interpolators.acceleration import Acceleration, smooth
+from rds.interpolators.acceleration import Acceleration, make_acceleration, smooth
 from rds.interpolators.deviation import path_distances
 from rds.interpolators.interpolator import Interpolator, as_interpolator, common_blu
 from rds.interpolators.reference_pulse import pulses
@@ -30,7 +30,7 @@ def interpolate(
     *,
     lines: Interpolator | str | Path | Callable[..., Any] | None = None,
     arcs: Interpolator | str | Path | Callable[..., Any] | None = None,
-    acceleration: Acceleration | None = None,
+    acceleration: Acceleration | str | None = None,
     exact_stop: bool = False,
     axes: Sequence[str] | None = None,
     rests: Mapping[int, float] | None = None,
@@ -39,9 +39,10 @@ def interpolate(
 
     `method` (default: constant velocity) interpolates it, `lines` and `arcs` in its stead what they are for: names of
     the library, paths of .py files, functions, or interpolators with options of their own (`rds.interpolator`).
-    `acceleration` filters the motion as one stream, so that corners are rounded; with `exact_stop` each segment by
-    itself, so that the axes come to rest at its end. `axes` are their names (default X, Y, Z, A, B, C). `rests` says
-    after which segments (by index; -1: before the first) the axes rest, and for how many s at least, a dwell's.
+    `acceleration`, a filter or its name, filters the motion as one stream, so that corners are rounded; with
+    `exact_stop` each segment by itself, so that the axes come to rest at its end. `axes` are their names (default X,
+    Y, Z, A, B, C). `rests` says after which segments (by index; -1: before the first) the axes rest, and for how many
+    s at least, a dwell's.
     Positions are in whole BLU where one of the methods says so. Raises InputError for segments that don't follow each
     other or that a method doesn't take, ContractError for a user's method that breaks its interface.
     """
@@ -57,6 +58,7 @@ def interpolate(
     chosen = [pair[isinstance(segment, ArcSegment)] for segment in segments]
     blu = common_blu(chosen)
     _check_rests(rests or {}, len(segments))
+    acceleration = make_acceleration(acceleration) if isinstance(acceleration, str) else acceleration
     parts = [each.rows(segment, T) for each, segment in zip(chosen, segments, strict=True)]
     weights = acceleration.weights(T) if acceleration else np.ones(1)
     if not any(map(len, parts)):

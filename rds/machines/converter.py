@@ -23,7 +23,7 @@ def as_voltage(value: Any) -> float:
         return value
     number = value
     if getattr(value, "size", None) == 1 and getattr(getattr(value, "dtype", None), "kind", "") in ("f", "i", "u"):
-        number = value.reshape(-1)[0].item()
+        number = value.item()
     try:
         if isinstance(number, Real) and not isinstance(number, bool) and isfinite(number):
             return float(number)

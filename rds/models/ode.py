@@ -42,7 +42,9 @@ def ode_model(
     start = _initial_state(initial_state)
     own = dict(params or {})
     return Model(
-        advance=partial(_advance_by_rk4, derivatives=derivatives, substeps=substeps),
+        advance=partial(
+            _advance_by_rk4, derivatives=derivatives, substeps=substeps, where=source.path if source else None
+        ),
         initial_state=start,
         params=own,
         output=_output(output, own),
@@ -68,7 +70,7 @@ def advance_model(
     start = _initial_state(initial_state)
     own = dict(params or {})
     return Model(
-        advance=partial(_advance_by_student, function=advance),
+        advance=partial(_advance_by_student, function=advance, where=_place(source)),
         initial_state=start,
         params=own,
         output=_output(output, own),
@@ -77,6 +79,10 @@ def advance_model(
         has_velocity=_has_velocity(start, output),
         timed=output is not None,
     )
+
+
+def _place(source: Source | None) -> str | None:
+    return source.path if source else None
 
 
 def _has_velocity(start: Sequence[float], output: Function | None) -> bool:
@@ -93,32 +99,45 @@ def _advance_by_rk4(
     derivatives: Function,
     substeps: int,
     t: float = 0.0,
+    where: str | None = None,
 ) -> tuple[float, ...]:
     state = np.array(x, dtype=float)
-    return tuple(rk4(partial(_checked, derivatives, state.size), t, state, _voltage(u), T, params, substeps).tolist())
+    checked = partial(_checked, derivatives, state.size, where)
+    return tuple(rk4(checked, t, state, _voltage(u), T, params, substeps).tolist())
 
 
-def _checked(derivatives: Function, size: int, t: float, x: np.ndarray, u: np.ndarray, params: Any) -> np.ndarray:
-    return _vector(derivatives(t, x, u, params), size, "derivatives", "dx/dt")
+def _checked(
+    derivatives: Function, size: int, where: str | None, t: float, x: np.ndarray, u: np.ndarray, params: Any
+) -> np.ndarray:
+    # of its own: a function that works in its x would change the state that the step goes on from
+    return _vector(derivatives(t, x.copy(), u, params), size, "derivatives", "dx/dt", where)
 
 
 def _advance_by_student(
-    x: Sequence[float], u: float, T: float, params: Mapping[str, Any], *, function: Function, t: float = 0.0
+    x: Sequence[float],
+    u: float,
+    T: float,
+    params: Mapping[str, Any],
+    *,
+    function: Function,
+    t: float = 0.0,
+    where: str | None = None,
 ) -> tuple[float, ...]:
     state = np.array(x, dtype=float)
-    return tuple(_vector(function(state, _voltage(u), T, params), state.size, "advance", "the next x").tolist())
+    return tuple(_vector(function(state, _voltage(u), T, params), state.size, "advance", "the next x", where).tolist())
 
 
 def _voltage(u: Any) -> np.ndarray:
     return np.array(u, dtype=float).reshape(1)
 
 
-def _vector(answer: Any, size: int, function: str, meaning: str) -> np.ndarray:
+def _vector(answer: Any, size: int, function: str, meaning: str, where: str | None = None) -> np.ndarray:
     vector = _flat(answer)
     if vector.size != size:
         raise ContractError(
             f"{function}() returned {shown(answer, 200)}; it must return {meaning}, "
-            f"{size} number{'s' if size != 1 else ''} as the initial state has"
+            f"{size} number{'s' if size != 1 else ''} as the initial state has",
+            where,
         )
     return vector
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rds.core.errors import InputError
+from rds.core.quantities import near
 from rds.core.registry import Registry
 
 if TYPE_CHECKING:
@@ -34,6 +35,6 @@ def mode_names(drives: Drive | None = None) -> list[str]:
 def load_mode(name: str) -> Mode:
     """The mode called `name`; InputError lists the ones there are."""
     if name not in MODES.modules:
-        raise InputError(f"unknown mode {name!r}; known modes: {', '.join(MODES.modules)}")
+        raise InputError(f"unknown mode {name!r}; known modes: {', '.join(MODES.modules)}{near(name, MODES.names())}")
     mode: Mode = MODES.module(name).MODE
     return mode

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.blame import student_error
 from rds.core.errors import ContractError, InputError
 from rds.core.quantities import Choice, Quantity, Text
 from rds.references.signal import Motion, Signal
@@ -93,7 +94,7 @@ def _answer(function: Callable[[float], Any], t: float, name: str) -> tuple[floa
     try:
         answer = function(t)
     except Exception as error:
-        raise ContractError(f"user signal: {name}(t) fails at t = {t:g} s: {type(error).__name__}: {error}") from error
+        raise ContractError(f"user signal: {name}(t) fails at t = {t:g} s: {student_error(error)}") from error
     try:
         numbers = tuple(np.asarray(answer, dtype=float).ravel().tolist())
     except (TypeError, ValueError):

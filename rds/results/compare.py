@@ -145,8 +145,8 @@ def compare(a: Result, b: Result) -> Comparison:
     Nothing is interpolated: results of different sample periods, or whose times are not multiples of it, have no
     common samples, and are refused. Raises InputError for these, and for results without a common axis or sample.
     """
-    if (other := next((each for each in (a, b) if not hasattr(each, "metrics")), None)) is not None:
-        said = f"{other}" if isinstance(other, str | Path) else f"{other!r:.60}"
+    if others := [each for each in (a, b) if not hasattr(each, "metrics")]:
+        said = f"{others[0]}" if isinstance(others[0], str | Path) else f"{others[0]!r:.60}"
         raise InputError(f"{said} is no result; rds.open_result opens the one that is there")
     T = a.sample_period
     if not math.isclose(T, b.sample_period, rel_tol=1e-9):

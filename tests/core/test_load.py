@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import sys
 import types
 from pathlib import Path
@@ -285,3 +286,26 @@ def test_an_error_without_a_line_or_a_message_still_says_what_it_is():
     assert student_error(ValueError("x")) == "ValueError: x"
     assert "cannot be printed" in student_error(Mute())
     assert len(student_error(ValueError("x" * 10_000))) < 400
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        ("30.0 * (r.position - y) ^ 2", r"for \^: .* \(a power is written \*\*\)"),
+        ("r.postion - y", r"attribute 'postion' \(r.position, r.velocity and r.acceleration are its numbers\)"),
+        ("r.position - y.position", r"attribute 'position' \(r has it; y is the position itself\)"),
+    ],
+)
+def test_a_slip_in_a_formula_is_told_with_its_remedy(tmp_path: Path, answer: str, said: str) -> None:
+    file = tmp_path / "law.py"
+    file.write_text(f"def control(t, r, y, state, params):\n    return {answer}, state\n")
+    with pytest.raises((AttributeError, TypeError)) as broken:
+        load_student(file).functions["control"](0.0, Reference(1.0, 0.0, 0.0), 0.5, (), {})
+    assert re.search(said, student_error(broken.value, file))
+
+
+def test_a_class_in_place_of_the_function_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "law.py"
+    file.write_text("class control:\n    def __call__(self, t, r, y, state, params):\n        return 0.0, state\n")
+    with pytest.raises(InputError, match=r"its `control` is a class; write a function, `def control\(t, r, y, state"):
+        load_student(file)

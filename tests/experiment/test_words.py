@@ -113,7 +113,7 @@ def edit(change: str, base: str = GOOD) -> str:
         ("sample_period = 0", 5, "sample_period = 0 must be from 1e-06 to 1000 s"),
         ("sample_period = 1e-300", 5, "must be from 1e-06"),
         ("sample_period = '1 ms'", 5, "sample_period = '1 ms' must be a number in s"),
-        ("kind = 'sine'", 8, "reference.kind = 'sine' is unknown; known: square, triangle, sinusoid, user"),
+        ("kind = 'sine'", 8, "reference.kind = 'sine' is unknown; known: square, .*did you mean 'sinusoid'"),
         ("kind = ['sine']", 8, "reference.kind = .'sine'. is unknown"),
         ("-kind", 7, 'kind is missing; as in `kind = "sinusoid"`'),
         ("amplitude = 'large'", 9, "amplitude = 'large' must be a number"),
@@ -127,6 +127,8 @@ def edit(change: str, base: str = GOOD) -> str:
         ("frequency = 600.0", 10, "frequency = 600 Hz is above half the sampling frequency .500 Hz"),
         ("frequency = -1.0", 10, "frequency = -1.0 must be more than 0"),
         ("name = 'traking'", 13, "controller.name = 'traking' is unknown; known: p, pid, .*did you mean 'tracking'"),
+        ("name = 'Tracking'", 13, "controller.name = 'Tracking' is unknown; .*did you mean 'tracking'"),
+        ("name = 'law.py'", 13, "controller.name = 'law.py' is a file, .*write `file = 'law.py'`"),
         ("name = 3", 13, "controller.name = 3 is unknown"),
         ("-name", 12, r"controller needs `name` \(p, pid, modified-pid, tracking, feedforward, .*\) or `file`"),
         ("gains = [1.0]", 14, "gains = .1.0. must be .g1, g2."),
@@ -199,6 +201,27 @@ def test_what_is_wrong_is_named(alone: Path, change: str, line: int | None, said
 )
 def test_whole_files_that_will_not_do(alone: Path, file: str, line: int | None, said: str) -> None:
     refused(alone, file, line, said)
+
+
+def test_a_key_below_the_tables_is_told_where_it_belongs(alone: Path) -> None:
+    late = edit("-duration") + "duration = 1.0\n"
+    refused(alone, late, None, r"line 15 belongs to \[controller\]: move it above the first \[table\]")
+    title = edit("-name\n-gains") + "file = 'law.py'\ntitle = 'mine'\n"
+    (alone / "law.py").write_text("def control(t, r, y, state, params):\n    return 0.0, ()\n")
+    refused(alone, title, 15, r"if the file's own 'title' is meant, move it above the first \[table\]")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("params = { gain = 3.0 }", "law.py: unknown parameter 'gain'; known parameters: Gain; did you mean 'Gain'"),
+        ("params = { Gain = '3' }", "law.py: parameter Gain = '3' must be a number, without quotes, as .* own 2.0 is"),
+        ("Gain = 3.0", r"unknown key 'Gain' in \[controller\]; it is one of the file's own params: write `params = "),
+    ],
+)
+def test_a_parameter_of_a_file_is_refused_where_it_is_given(alone: Path, words: str, said: str) -> None:
+    (alone / "law.py").write_text("params = {'Gain': 2.0}\ndef control(t, r, y, state, params):\n    return 0.0, ()\n")
+    refused(alone, edit("-name\n-gains") + f"file = 'law.py'\n{words}\n", 15, said)
 
 
 def refused(folder: Path, file: str, line: int | None, said: str) -> None:
@@ -324,7 +347,7 @@ def test_the_same_in_python() -> None:
         ({"duration": "1"}, "must be a number in s"),
         ({"controller": None}, "controller of axis X is missing"),
         ({"controller": 3}, "controller = 3 must be a name"),
-        ({"controller": lambda t: 0.0}, "cannot tell which interface"),
+        ({"controller": lambda t: 0.0}, "cannot be called as control.t, r, y, state, params."),
         ({"controller": "tracking.py"}, "there is no such file as .*tracking.py"),
         ({"reference": 3}, "reference = 3 must be a signal"),
         ({"reference": None}, r"has no \[reference\]"),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
 from rds.core.errors import ContractError, InputError
-from rds.core.load import from_namespace
+from rds.core.load import from_namespace, load_student
 from rds.models.student import student_model
 
 TAU, K = 9.943e-3, 1.764
@@ -64,3 +65,20 @@ def test_a_missing_initial_state_is_noticed_before_the_run(function):
 def test_a_controller_is_no_model():
     with pytest.raises(ContractError, match="no model"):
         student_model(from_namespace({"control": lambda t, r, y, state, params: (0.0, state)}))
+
+
+def test_derivatives_that_work_in_their_x_leave_the_state_as_it_is(tmp_path: Path) -> None:
+    head, acceleration = "def derivatives(t, x, u, params):\n", "(1.7 * u[0] - x[1] + 2.0) / 0.01"
+    pure, inside = tmp_path / "pure.py", tmp_path / "inside.py"
+    pure.write_text(f"{head}    return [x[1], {acceleration.replace('2.0', '1.0')}]\n")
+    inside.write_text(f"{head}    speed = x[1]\n    x[1] += 1.0\n    return [speed, {acceleration}]\n")
+    there = [student_model(load_student(file)) for file in (pure, inside)]
+    ends = [model.advance((0.0, 0.0), 5.0, 1e-3, model.params) for model in there]
+    assert ends[1] == pytest.approx(ends[0], rel=1e-12)
+
+
+def test_an_answer_of_a_wrong_size_names_its_file(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("initial_state = [0.0, 0.0]\ndef derivatives(t, x, u, params):\n    pass\n")
+    model = student_model(load_student(tmp_path / "mine.py"))
+    with pytest.raises(ContractError, match=r"mine.py: derivatives\(\) returned None; it must return dx/dt, 2 numbers"):
+        model.advance((0.0, 0.0), 5.0, 1e-3, model.params)

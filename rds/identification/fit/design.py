@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.controllers import tracking
+from rds.core.adapt import is_control_system
 from rds.core.atomic import keep_another, write_whole
 from rds.core.errors import InputError
 from rds.core.types import Controller
@@ -68,6 +69,11 @@ def linear_axis_of(model: Linear | ModelFile | Estimate | str | Path) -> Linear:
         return model
     if isinstance(model, Estimate):
         model = _unwritten(model)
+    if is_control_system(model):
+        raise InputError(
+            f"a {type(model).__name__} of python-control is no fitted axis; give a model file or an estimate, or "
+            "design by python-control and hand that system in as the controller of an Experiment"
+        )
     file = model if isinstance(model, ModelFile) else read_model(model)
     made = run_model(file)
     if file.structure == "spindle":

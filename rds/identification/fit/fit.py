@@ -46,6 +46,8 @@ def fit(
     logs = as_logs(logs)
     if not logs:
         raise InputError("there is no log to fit; name at least one")
+    if not isinstance(options, Mapping | None):
+        raise InputError(f"options = {options!r:.60} must be a dict, such as {{'fixed': {{'tau': 0.01}}}}")
     structure = make_structure(structure) if isinstance(structure, str | Path) else structure
     if not isinstance(structure, Structure):
         raise InputError(f"{structure!r:.60} is no structure; give its name, such as 'axis', or rds.structure(...)")

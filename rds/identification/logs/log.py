@@ -206,6 +206,8 @@ def as_logs(given: Any) -> list[Log]:
     """One log or several as a list. InputError for what is none, such as a file that was not read."""
     logs = list(given) if isinstance(given, Iterable) and not isinstance(given, Log | str | Path) else [given]
     if (other := next((log for log in logs if not isinstance(log, Log)), None)) is not None:
+        if hasattr(given, "columns"):  # a result or a table of pandas, which goes through the names of its columns
+            other = given
         data = "rds.Log.of(data, units=...) makes one of u and y"
         said = data if hasattr(other, "u") and hasattr(other, "y") else "rds.read_log(FILE) gives those of a file"
         raise InputError(f"{other!r:.60} is no log; {said}")

@@ -120,7 +120,7 @@ def read_cut(path: str | Path) -> CutFile:
 
 def cut_of(words: Mapping[str, Any]) -> CutFile:
     """A cut from words, as options give them."""
-    return _cut(TomlTable(dict(words), CUT, path="the cut"), Path())
+    return _cut(TomlTable(dict(words), CUT, path="the cut (options such as --depth 1.0, or a file by --cut)"), Path())
 
 
 def _cut(table: TomlTable, folder: Path) -> CutFile:

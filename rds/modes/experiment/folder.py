@@ -10,6 +10,8 @@ from pathlib import Path
 
 from rds.core.errors import InputError
 
+_HEADING = b"time [s],"  # how the table of each run begins
+
 
 def new_folder(names: Sequence[str], mode: str) -> Path:
     """Where the results of a run of these axes go when nobody says: a new folder under `runs/`."""
@@ -18,7 +20,10 @@ def new_folder(names: Sequence[str], mode: str) -> Path:
 
 
 def require_writable(folder: str | Path) -> None:
-    """InputError unless files can be written into `folder`, which need not be there yet; nothing is left there."""
+    """InputError unless files can be written into `folder`, which need not be there yet; nothing is left there.
+
+    So is a folder that holds a `result.csv` of somebody else's, which a run would replace.
+    """
     folder = Path(folder)
     place = folder
     try:
@@ -28,9 +33,17 @@ def require_writable(folder: str | Path) -> None:
             place = place.parent
         with tempfile.TemporaryFile(dir=place):
             pass
+        table = folder / "result.csv"
+        if table.is_file() and not _is_of_a_run(table):
+            raise InputError("is there already, and is no result of a run; name another folder", str(table))
     except OSError as error:
         said = error.strerror or error
         raise InputError(f"results cannot be written there ({said}); name another folder", str(folder)) from error
+
+
+def _is_of_a_run(table: Path) -> bool:
+    with table.open("rb") as file:
+        return file.read(len(_HEADING)) == _HEADING or table.with_suffix(".json").exists()
 
 
 def holds_result(folder: str | Path) -> bool:

@@ -63,9 +63,9 @@ def make_model(words: TomlTable, setting: Setting) -> Model:
         substeps = table.read("substeps")
         if "substeps" in table and "advance" in student.functions:
             raise table.fault("substeps", "is for derivatives(), and advance() takes a sample in one step; remove it")
-        params = _params(table)
+        params = _params(table, student)
         table.done()
-        with named(table), limited():  # it may be called once
+        with named(table.inner("params") or table), limited():  # it may be called once
             return student_model(student, params, substeps)
     if "file" in table:
         return _fitted_model(table, setting)
@@ -113,9 +113,9 @@ def make_controller(words: TomlTable, setting: Setting, model: Model) -> Control
         return as_controller(given, setting.T)
     table, student = _table_or_student(words, "controller", setting)
     if student is not None:
-        is_coupled, params = table.read("coupled"), _params(table)
+        is_coupled, params = table.read("coupled"), _params(table, student)
         table.done()
-        with named(table), limited():  # it is called once
+        with named(table.inner("params") or table), limited():  # it is called once
             return student.controller(coupled=is_coupled, params=params)
     name, options = _name_and_options(table, "controller", controller_names())
     if model.motion is MachineAxisMotion:
@@ -173,7 +173,7 @@ def _table_or_student(words: TomlTable, key: str, setting: Setting) -> tuple[Tom
             return _functions(words, key, given), from_namespace(given)
     elif callable(given):
         with named(nameless):
-            return nameless, from_function(given)
+            return nameless, from_function(given, role="control" if key == "controller" else None)
     elif not isinstance(given, dict):
         if key == "model":
             _refuse_estimate(words, given)
@@ -214,12 +214,21 @@ def _name_and_options(table: TomlTable, kind: str, known: Sequence[str]) -> tupl
     """The library part that a table names, and the rest of the table."""
     if "name" not in table:
         raise InputError(f"{kind} needs `name` ({', '.join(known)}) or `file`", table.place())
+    if str(table.any("name")).endswith((".py", ".toml")):
+        raise table.fault("name", f"is a file, and `name` a part of the library; write `file = {table.any('name')!r}`")
     name = table.read("name")
     return name, {key: table.any(key) for key in table.table if key != "name"}
 
 
-def _params(table: TomlTable) -> dict[str, Any] | None:
+def _params(table: TomlTable, student: StudentFile) -> dict[str, Any] | None:
+    """Values over the file's own; InputError for one that stands beside `params` and not in it."""
     inner = table.inner("params")
+    known = () if table.declared is None else table.declared.keys
+    if isinstance(student.params, Mapping):
+        for key in table.table:
+            if key in student.params and key not in known:
+                said = f"unknown key '{key}'{f' in [{table.name}]' if table.name else ''}; it is one of the file's own"
+                raise InputError(f"{said} params: write `params = {{ {key} = ... }}`", table.place(key))
     return dict(inner.table) if inner else None
 
 

@@ -237,7 +237,7 @@ def _interpolator(words: TomlTable, key: str, folder: Path, options: Mapping[str
     if isinstance(given, StudentFile):
         return from_student(given, options)
     if callable(given):
-        return from_student(from_function(given), options)
+        return from_student(from_function(given, role="interpolate"), options)
     if not isinstance(given, str):
         raise words.fault(key, "must be a name of the library, the path of a .py file, or a function")
     is_file = given not in LIBRARY.modules and given.endswith(".py")

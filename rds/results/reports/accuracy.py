@@ -88,6 +88,9 @@ def report_on(sets: Sequence[Moves], sources: Sequence[str] = (), settings: Mapp
 
 def read(path: Path, settings: Mapping[str, Any]) -> Moves:
     """Moves from a CSV file with a column per direction, in counts (or in mm or deg, which become counts)."""
+    if not path.is_file():
+        kind = "is a folder" if path.is_dir() else "there is no such file"
+        raise InputError(f"{kind}; check the name of the file", str(path))
     about = _about(path, settings)
     missing = [name for name in ("distance", "counts_per_unit") if about[name] is None]
     if missing:
