@@ -10,6 +10,7 @@ from collections.abc import Callable
 from math import inf
 from pathlib import Path
 from threading import Event, Thread
+from time import sleep
 from types import SimpleNamespace
 from typing import Any
 
@@ -176,6 +177,14 @@ def test_after_an_interruption_in_a_kernel_the_next_one_is_a_first_one() -> None
     TieredKernel.spent = 0.0
     tiered(lambda: sum(range(1000)))()
     assert TieredKernel.spent > 0.0
+
+
+@pytest.mark.usefixtures("all_in_python")
+def test_a_short_program_on_a_busy_computer_is_short() -> None:
+    """By the clock, one of three lines was compiled for ten minutes beside other work."""
+    TieredKernel.spent = 0.0
+    tiered(lambda: sleep(0.2))()
+    assert TieredKernel.spent < 0.1
 
 
 @pytest.mark.skipif(np.lib.NumpyVersion(np.__version__) < "2.0.0", reason="it is by context from numpy 2 on")
