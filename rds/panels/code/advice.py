@@ -12,6 +12,7 @@ from rds.panels.equipment.build import Mark
 _PLACE = re.compile(r"(?:in )?[^\s:,]+\.py, line \d+(?:, in \w+)?: ")
 _QUOTED = re.compile(r": `[^`]*`(?=\s*\(rule:|$|;)")
 _RULE = re.compile(r" \(rule: [^()]*\)$")
+_NO_ATTRIBUTE = r"'Reference' object has no attribute '(\w+)'"
 _IMPORTS = {"np": "import numpy as np", "numpy": "import numpy", "math": "import math"}
 _MATHS = ("sin", "cos", "tan", "sqrt", "exp", "pi", "atan2", "hypot", "copysign", "floor", "ceil", "dist")
 
@@ -21,13 +22,14 @@ def told(mark: Mark, text: str, params: Iterable[str]) -> Mark:
     if mark.line is None:
         return mark
     said = _RULE.sub("", _QUOTED.sub("", _PLACE.sub("", mark.text)))
+    said = re.sub(rf"({_NO_ATTRIBUTE}) \(.*?\)", r"\1", said)  # the advice names r's numbers
     known = {*params, *re.findall(r"\b[A-Za-z_]\w*", re.sub(r"#.*|([\"']).*?\1", "", text))}
     advice = _advice(said, list(params), known)
     return Mark(mark.line, f"{said}. {advice}" if advice else said, mark.fault)
 
 
 def _advice(said: str, params: list[str], known: set[str]) -> str:
-    if found := re.search(r"'Reference' object has no attribute '(\w+)'", said):
+    if found := re.search(_NO_ATTRIBUTE, said):
         near = get_close_matches(found[1], Reference._fields, 1, 0.5)
         return f"{f'Did you mean r.{near[0]}? ' if near else ''}r has {', '.join(Reference._fields)}"
     if found := re.search(r"KeyError: '(\w+)'", said):
