@@ -35,7 +35,8 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
 )
 
 # Typer builds all commands of `rds` for each line that a test types, at 0.1 s: here once, as each program does.
-typer.testing._get_command = cache(typer.testing._get_command)
+if build := getattr(typer.testing, "_get_command", None):
+    typer.testing._get_command = cache(build)  # type: ignore[attr-defined]
 
 # A shell that runs the tests in the background has them ignore Ctrl-C, and nohup the end of a terminal; so would all
 # that they start.

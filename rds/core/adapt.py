@@ -179,7 +179,9 @@ def _linear_control(t: float, r: Reference, y: float, state: Sequence[float], pa
 
 
 def _is_alike_everywhere(params: Any) -> bool:
-    """Whether a state at rest under zero volts belongs to every place: an observer's, not that of a spring's force."""
+    """Whether a state at rest under zero volts belongs to every place: an observer's, and not that of a spring's force,
+    unless an integrator could make up for it.
+    """
     A, B, C, D = (np.array(params[name]) for name in "ABCD")
     place = {2: [1.0, 1.0], 4: [1.0, 0.0, 0.0, 1.0]}.get(D.shape[1])
     if place is None:  # of the error r - y

@@ -12,7 +12,7 @@ from math import hypot, isfinite
 
 from rds.identification.validate.assessment import Assessment
 from rds.identification.validate.verdict import Bands, Reason, Side
-from rds.identification.validate.within import judged_by
+from rds.identification.validate.within import judged_by, tells_speed_alone
 
 _APART = 6.0  # standard errors of both, as for logs that are fitted together (`fit/contradiction.py`)
 _MATTERS = 0.03  # of a parameter's value
@@ -55,7 +55,12 @@ def _measures(assessments: Mapping[str, Assessment], bands: Bands) -> Iterator[t
     by_log = {log: found for log, a in assessments.items() if (found := judged_by(a, bands)) is not None}
     bounds = {"gain": bands.gain_percent, "lag": bands.delay, "friction": bands.friction_percent}
     for kind, least in bounds.items():
-        offs = {log: off for log, found in by_log.items() if (off := getattr(found, kind)) is not None}
+        offs = {
+            log: off
+            for log, found in by_log.items()
+            if (off := getattr(found, kind)) is not None
+            and (kind == "lag" or not tells_speed_alone(assessments[log], found))
+        }
         told = {log: (off.value, off.error, off.unit) for log, off in offs.items()}
         if len(told) > 1:
             yield f"what the model is off by in its {kind}", told, least

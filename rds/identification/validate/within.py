@@ -9,7 +9,7 @@ import numpy as np
 
 from rds.identification.fit.estimate import Errors
 from rds.identification.validate.assessment import Assessment
-from rds.identification.validate.discrepancy import Discrepancy, Off
+from rds.identification.validate.discrepancy import EXPLAINED, Discrepancy, Off
 from rds.identification.validate.verdict import Bands
 
 AS_NOISE = 1.2  # times what noise makes of an error: no model could be better
@@ -106,7 +106,8 @@ def judged_by(a: Assessment, bands: Bands) -> Discrepancy | None:
 def measures(a: Assessment, bands: Bands) -> list[Measure]:
     """Gain and phase, and delay and friction where they are known; empty where nothing is.
 
-    Of a motion with one level of command each way: the speed in place of gain and friction.
+    Of a log with one level of command each way that is judged as motion, or of which more than noise is left beside
+    the best axis, which then takes what it lacks for gain or friction: the speed in place of these two.
     """
     found = judged_by(a, bands)
     if found is None:
@@ -116,11 +117,21 @@ def measures(a: Assessment, bands: Bands) -> list[Measure]:
         # the model leaves noise alone: what the parameters of an axis leave open, the motion itself may tell
         beside = _gain_and_phase(motion, bands)
         listed = [b if not m.told and b.told and not b.wrong else m for m, b in zip(listed, beside, strict=True)]
+    together = tells_speed_alone(a, found)
+    if together and motion is not None:
+        listed[0] = _gain_and_phase(motion, bands)[0]
     if found.delay is not None:
         listed.append(Measure("delay", found.delay, max(bands.delay, 1.5 * a.log.sample_period), found.by_chance))
-    if found.friction is not None:
+    if found.friction is not None and not together:
         listed.append(Measure("friction", found.friction, bands.friction_percent, found.by_chance))
     return listed
+
+
+def tells_speed_alone(a: Assessment, found: Discrepancy) -> bool:
+    """Whether gain and friction of `found`, by which the log is judged, cannot be told apart: see `measures`."""
+    if a.as_motion is None or a.as_motion.speed is None:
+        return False
+    return found is a.as_motion or found.reached > EXPLAINED * a.noise
 
 
 def _gain_and_phase(found: Discrepancy, bands: Bands) -> list[Measure]:
