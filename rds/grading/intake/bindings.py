@@ -12,9 +12,11 @@ from rds.grading.intake import followed
 from rds.grading.sandbox.packages import ALLOWED
 
 _THERE = frozenset({*sys.stdlib_module_names, *ALLOWED})  # modules that a submission can import
-
-
 _READERS = frozenset({"open", "loadtxt", "genfromtxt", "load", "loadmat", "fromfile"})
+_OF_LISTS = {"append", "clear", "extend", "fill", "insert", "pop", "put", "remove", "reverse", "sort"}
+_OF_TABLES = {"add", "discard", "popitem", "setdefault", "update"}
+CHANGING = frozenset(_OF_LISTS | _OF_TABLES)
+"""Methods that change what they are called on."""
 
 
 def imported(statement: ast.stmt) -> Iterator[tuple[str, str]]:
