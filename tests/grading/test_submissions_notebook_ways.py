@@ -235,6 +235,8 @@ def test_a_fitted_parameter_that_is_set_again_by_hand_is_graded(cell: str) -> No
         "if True:\n    params = {'K': 1.0, 'tau': 0.3}\nparams.update(fit.params)\nparams['K'] = 1.6",
         "g = [1.0, 0.02]\ng.sort(key=fit.rank)\ng[0] = 1.6\nparams['tau'] = g[1]",
         "K = 1.0\nK = fit.params['K']\ndef gain(k=K):\n    return k\nK = 1.6\nparams['K'] = gain()",
+        "K = 1.0\ndef own():\n    return K\nK = fit.params['K']\ngain = own()\nK = 1.6\nparams['K'] = gain",
+        "K = 1.0\ndef own(x):\n    return K * x\nK = fit.params['K']\ngains = list(map(own, [1.0]))\nK = 1.6\nparams['K'] = gains[0]",
         "K = 1.0\nK = fit.params['K']\nclass Gains:\n    own = K\nK = 1.6\nparams['K'] = Gains.own",
         "params['K'] = np.loadtxt('log.csv')[0]",
         "if __name__ == '__main__':\n    params['K'] = fit.params['K']",

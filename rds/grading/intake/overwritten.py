@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
-from rds.grading.intake.bindings import CHANGING, at_once, bound, root, stored
+from rds.grading.intake.bindings import CHANGING, at_once, bound, root, stored, used_within
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def _is_set_again(
     left = _keys_set(body[number], name, functions) or _keys_there(body[:number], name)
     for each in after:
         sets = [one for one in _plainly_set(body[each]) if one.name == name]
-        if name in _read(body[each]):
+        if name in _read(body[each], functions):
             return False
         for one in sets:
             if one.keys is None:
@@ -133,8 +133,11 @@ def _keys_given(called: ast.Call) -> set[object] | None:
     return keys
 
 
-def _read(statement: ast.stmt) -> set[str]:
-    """The names whose values a statement uses where it stands: not those whose parts it only sets."""
+def _read(statement: ast.stmt, functions: Mapping[str, ast.FunctionDef]) -> set[str]:
+    """The names whose values a statement uses where it stands, also by the functions that it names.
+
+    Not those whose parts it only sets.
+    """
     only_set: set[int] = set()
     if isinstance(statement, ast.Assign | ast.AnnAssign):
         parts = chain.from_iterable(map(ast.walk, bound(statement)[0]))
@@ -149,6 +152,10 @@ def _read(statement: ast.stmt) -> set[str]:
             found.add(node.id)
         elif isinstance(node, ast.AugAssign):
             found |= {root(node.target), *stored(node.target)}
+    called: set[str] = set()
+    while more := (found & functions.keys()) - called:
+        called |= more
+        found = found.union(*(used_within(functions[each]) for each in more))
     return found
 
 
