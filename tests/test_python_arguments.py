@@ -308,12 +308,27 @@ def test_what_a_command_lacks_is_named(command: str, said: str) -> None:
     assert refused.exit_code == 2 and said in refused.stderr, refused.output
 
 
-def test_a_table_of_somebody_else_s_is_not_replaced_by_a_run_s(here: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("result.csv", "time,position\n0,0\n"),
+        ("result.csv", "time [s],voltage [V],position [mm]\n0,0,0\n"),
+        ("result.mat", "MATLAB 5.0 MAT-file"),
+        ("result.json", "{}"),
+    ],
+)
+def test_a_table_of_somebody_else_s_is_not_replaced_by_a_run_s(here: Path, name: str, text: str) -> None:
     (here / "mine").mkdir()
-    (here / "mine" / "result.csv").write_text("time,position\n0,0\n")
-    with pytest.raises(rds.InputError, match=r"mine/result.csv: is there already, and is no result of a run; name ano"):
+    (here / "mine" / name).write_text(text)
+    with pytest.raises(rds.InputError, match=rf"mine/{name}: is there already, and is no result of a run; name anothe"):
         short().run(out="mine")
-    assert (here / "mine" / "result.csv").read_text() == "time,position\n0,0\n"
+    assert (here / "mine" / name).read_text() == text
+
+
+@pytest.mark.parametrize("left", ["result.csv", "result.json"])
+def test_what_is_left_of_a_run_is_replaced_by_the_next(here: Path, left: str) -> None:
     short().run(out="ours")
-    (here / "ours" / "result.json").unlink()
+    for path in (here / "ours").glob("result.*"):
+        if path.name != left:
+            path.unlink()
     assert short().run(out="ours").length == 0.5

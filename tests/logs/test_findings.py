@@ -401,3 +401,13 @@ def test_what_some_stretches_have_is_said_of_these(tmp_path: Path) -> None:
     (tmp_path / "log.csv.map.toml").write_text('gaps = "split"\n' + MAP)
     said = [finding.what for finding in describe(path).findings if "only 60 samples" in finding.what]
     assert len(said) == 1 and said[0].startswith("log part 2, log part 4: it has only 60 samples")
+
+
+@pytest.mark.parametrize("levels", [(4.0, 0.6), (2.0, 1.7), (2.0, 1.85)])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_the_steps_of_a_command_are_no_noise_of_it(tmp_path: Path, levels: tuple[float, float], noise: float) -> None:
+    """Two levels each way were taken for one: the steps of a clean command were called noise."""
+    voltage = np.repeat([s * level for level in levels for s in (1.0, -1.0)] * 4, 250)
+    voltage += noise * np.random.default_rng(1).standard_normal(4000)
+    columns = {"time": np.arange(4000) * 1e-3, "voltage": voltage, "position": np.cumsum(voltage) * 1e-3}
+    assert not [f for f in read(tmp_path, columns).findings if "one level in each direction" in f.what]

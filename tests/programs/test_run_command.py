@@ -102,7 +102,7 @@ def test_what_is_replaced_is_told(part: Path, monkeypatch: pytest.MonkeyPatch) -
     earlier = [Path("out") / name for name in ("changes.csv", "program-changed-while-it-ran.csv")]
     Path("out").mkdir()
     for file in (*earlier, Path("out/result.csv"), Path("out/program.txt")):
-        file.write_text("time [s],of an earlier run\n")
+        file.write_text("time [s],X_measured [mm]\n")
     done = CliRunner().invoke(app, ["nc", "run", "part.ngc", "--out", "out"])
     assert done.exit_code == 0, done.output
     assert "out: replaces the results of an earlier run there" in done.stderr

@@ -12,9 +12,11 @@ from rds.grading.intake import followed
 from rds.grading.sandbox.packages import ALLOWED
 
 _THERE = frozenset({*sys.stdlib_module_names, *ALLOWED})  # modules that a submission can import
-
-
 _READERS = frozenset({"open", "loadtxt", "genfromtxt", "load", "loadmat", "fromfile"})
+_OF_LISTS = {"append", "clear", "extend", "fill", "insert", "pop", "put", "remove", "reverse", "sort"}
+_OF_TABLES = {"add", "discard", "popitem", "setdefault", "update"}
+CHANGING = frozenset(_OF_LISTS | _OF_TABLES)
+"""Methods that change what they are called on."""
 
 
 def imported(statement: ast.stmt) -> Iterator[tuple[str, str]]:
@@ -49,7 +51,7 @@ def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str]) -> list[frozenset
     for statement in body:
         here = now
         if isinstance(statement, followed.FUNCTIONS):
-            if _used_within(statement) & now or reads_file(statement):
+            if used_within(statement) & now or reads_file(statement):
                 now = now | {statement.name} - wanted
             elif statement.name in now - code:
                 now -= {statement.name}
@@ -79,7 +81,7 @@ def _writes(opened: ast.Call) -> bool:
     )
 
 
-def _used_within(function: ast.stmt) -> set[str]:
+def used_within(function: ast.stmt) -> set[str]:
     """The names of the notebook that a function uses: not its own, which may be called the same."""
     tables, found = symtable.symtable(ast.unparse(function), "notebook", "exec").get_children(), set()
     while tables:

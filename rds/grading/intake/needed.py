@@ -16,6 +16,7 @@ from itertools import chain
 
 from rds.grading.intake import followed
 from rds.grading.intake.bindings import (
+    CHANGING,
     at_once,
     bound,
     from_elsewhere,
@@ -28,11 +29,6 @@ from rds.grading.intake.bindings import (
     stored,
 )
 from rds.grading.intake.overwritten import is_set_again
-
-_OF_LISTS = {"append", "clear", "extend", "fill", "insert", "pop", "put", "remove", "reverse", "sort"}
-_OF_TABLES = {"add", "discard", "popitem", "setdefault", "update"}
-_CHANGING = frozenset(_OF_LISTS | _OF_TABLES)
-"""Methods that change what they are called on."""
 
 _BY_FIRST_ARGUMENT = frozenset({"setattr", "delattr", "setitem", "delitem"})
 """Functions that change their first argument, whatever module they are taken from."""
@@ -304,7 +300,7 @@ def _changed(tree: ast.AST) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute | ast.Subscript) and not isinstance(node.ctx, ast.Load):
             yield root(node)
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in _CHANGING:
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in CHANGING:
             yield root(node.func)
             if node.args:
                 yield root(node.args[0])  # dict.update(params, ...)

@@ -11,9 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
-from rds.grading.intake.bindings import at_once, bound, root, stored
-
-_CHANGING = frozenset({"update", "setdefault", "pop", "popitem", "clear", "append", "extend", "insert", "fill", "put"})
+from rds.grading.intake.bindings import CHANGING, at_once, bound, root, stored, used_within
 
 
 @dataclass(frozen=True)
@@ -37,14 +35,13 @@ def _is_set_again(
     left = _keys_set(body[number], name, functions) or _keys_there(body[:number], name)
     for each in after:
         sets = [one for one in _plainly_set(body[each]) if one.name == name]
-        if name in _read(body[each]):
+        if name in _read(body[each], functions):
             return False
         for one in sets:
             if one.keys is None:
                 return True
-            left -= one.keys
-            if not left:
-                return len(one.keys) > 0
+            if left and not (left := left - one.keys):
+                return True
     return False
 
 
@@ -63,25 +60,44 @@ def _keys_set(statement: ast.stmt, name: str, functions: Mapping[str, ast.Functi
             return frozenset()
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and root(node.func) == name:
             given = _keys_given(node)
-            if node.func.attr in _CHANGING and (node.func.attr != "update" or given is None):
+            if node.func.attr in CHANGING and (node.func.attr != "update" or given is None):
                 return frozenset()
             keys |= (given if node.func.attr == "update" else None) or set()
     return frozenset(keys)
 
 
 def _keys_there(before: Sequence[ast.stmt], name: str) -> frozenset[object]:
-    """The keys of the table that `name` was last bound to; none where these are not known."""
+    """The keys of the table `name` from where it was last bound on; none where these are not known."""
+    added: frozenset[object] = frozenset()
     for statement in reversed(before):
-        for targets, value in [bound(statement)]:
-            if not any(isinstance(target, ast.Name) and target.id == name for target in targets):
-                continue
-            if isinstance(value, ast.Dict):
-                keys = [key.value for key in value.keys if isinstance(key, ast.Constant)]
-                return frozenset(keys) if len(keys) == len(value.keys) else frozenset()
-            if isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id == "dict":
-                return frozenset(word.arg for word in value.keywords) if not value.args else frozenset()
+        sets = [one.keys for one in _plainly_set(statement) if one.name == name]
+        if None in sets:
+            keys = _keys_of(bound(statement)[1])
+            return frozenset() if keys is None else keys | added
+        if not all(sets) or (not sets and _is_set_within(statement, name)):
             return frozenset()
+        added = added.union(*filter(None, sets))
     return frozenset()
+
+
+def _keys_of(value: ast.AST | None) -> frozenset[object] | None:
+    """The keys of a table that is written out; None where these are not known."""
+    if isinstance(value, ast.Dict) and all(isinstance(key, ast.Constant) for key in value.keys):
+        return frozenset(key.value for key in value.keys if isinstance(key, ast.Constant))
+    if isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id == "dict":
+        words = [word.arg for word in value.keywords]
+        return None if value.args or None in words else frozenset(words)
+    return None
+
+
+def _is_set_within(statement: ast.stmt, name: str) -> bool:
+    """Whether a statement, such as a loop, sets a name or parts of what it stands for."""
+    return any(
+        isinstance(node, ast.Name | ast.Attribute | ast.Subscript)
+        and not isinstance(node.ctx, ast.Load)
+        and root(node) == name
+        for node in chain.from_iterable(map(ast.walk, at_once(statement)))
+    )
 
 
 def _plainly_set(statement: ast.stmt) -> Iterator[_Set]:
@@ -117,8 +133,11 @@ def _keys_given(called: ast.Call) -> set[object] | None:
     return keys
 
 
-def _read(statement: ast.stmt) -> set[str]:
-    """The names whose values a statement uses where it stands: not those whose parts it only sets."""
+def _read(statement: ast.stmt, functions: Mapping[str, ast.FunctionDef]) -> set[str]:
+    """The names whose values a statement uses where it stands, also by the functions that it names.
+
+    Not those whose parts it only sets.
+    """
     only_set: set[int] = set()
     if isinstance(statement, ast.Assign | ast.AnnAssign):
         parts = chain.from_iterable(map(ast.walk, bound(statement)[0]))
@@ -128,9 +147,23 @@ def _read(statement: ast.stmt) -> set[str]:
         if isinstance(function, ast.Attribute) and function.attr == "update":
             only_set = {id(function.value)}
     found = set()
-    for node in chain.from_iterable(map(ast.walk, at_once(statement))):
+    for node in chain.from_iterable(map(ast.walk, [*at_once(statement), *_run_by_definition(statement)])):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and id(node) not in only_set:
             found.add(node.id)
         elif isinstance(node, ast.AugAssign):
             found |= {root(node.target), *stored(node.target)}
+    called: set[str] = set()
+    while more := (found & functions.keys()) - called:
+        called |= more
+        found = found.union(*(used_within(functions[each]) for each in more))
     return found
+
+
+def _run_by_definition(statement: ast.stmt) -> Sequence[ast.AST]:
+    """What a definition runs where it stands, beside decorators: a function's defaults, and a class's statements."""
+    if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
+        return [default for default in (*statement.args.defaults, *statement.args.kw_defaults) if default is not None]
+    if isinstance(statement, ast.ClassDef):
+        within = ((*at_once(each), *_run_by_definition(each)) for each in statement.body)
+        return [*statement.bases, *chain.from_iterable(within)]
+    return []

@@ -108,10 +108,15 @@ def _levels(command: np.ndarray, sign: float) -> int:
     What is no farther apart than noise of a measured command puts it is one level.
     """
     largest = float(np.abs(command).max())
-    width = float(np.clip(_NOISY * noise(command), _LEVEL * largest, _MOST_NOISE * largest))
+    width = float(np.clip(_NOISY * _noise_of(command), _LEVEL * largest, _MOST_NOISE * largest))
     there = sign * command[sign * command > width]
     if len(there) == 0:
         return 0
     apart = np.rint((there - np.median(there)) / width).astype(int)
     counts = np.bincount(apart - apart.min())
     return int((counts > max(_LEAST * len(there), 1)).sum()) or 2
+
+
+def _noise_of(command: np.ndarray) -> float:
+    """The noise of a measured command; 0 for one that mostly stays as it is: what changes in it are its own steps."""
+    return noise(command) if len(command) > 3 and np.median(np.abs(np.diff(command, 3))) > 0.0 else 0.0

@@ -10,7 +10,9 @@ from pathlib import Path
 
 from rds.core.errors import InputError
 
-_HEADING = b"time [s],"  # how the table of each run begins
+_FILES = ("result.csv", "result.json", "result.mat", "result.parquet")
+_OF_A_RUN = {"result.csv": b"_measured [", "result.json": b'"rds result"'}  # what stands at the begin of each
+_BEGIN = 10_000  # bytes
 
 
 def new_folder(names: Sequence[str], mode: str) -> Path:
@@ -22,7 +24,7 @@ def new_folder(names: Sequence[str], mode: str) -> Path:
 def require_writable(folder: str | Path) -> None:
     """InputError unless files can be written into `folder`, which need not be there yet; nothing is left there.
 
-    So is a folder that holds a `result.csv` of somebody else's, which a run would replace.
+    So is a folder that holds files of these names which are no run's: a run would replace them.
     """
     folder = Path(folder)
     place = folder
@@ -33,17 +35,17 @@ def require_writable(folder: str | Path) -> None:
             place = place.parent
         with tempfile.TemporaryFile(dir=place):
             pass
-        table = folder / "result.csv"
-        if table.is_file() and not _is_of_a_run(table):
-            raise InputError("is there already, and is no result of a run; name another folder", str(table))
+        there = [folder / name for name in _FILES if (folder / name).is_file()]
+        if there and not any(map(_is_of_a_run, there)):
+            raise InputError("is there already, and is no result of a run; name another folder", str(there[0]))
     except OSError as error:
         said = error.strerror or error
         raise InputError(f"results cannot be written there ({said}); name another folder", str(folder)) from error
 
 
-def _is_of_a_run(table: Path) -> bool:
-    with table.open("rb") as file:
-        return file.read(len(_HEADING)) == _HEADING or table.with_suffix(".json").exists()
+def _is_of_a_run(path: Path) -> bool:
+    with path.open("rb") as file:
+        return path.name in _OF_A_RUN and _OF_A_RUN[path.name] in file.read(_BEGIN)
 
 
 def holds_result(folder: str | Path) -> bool:
