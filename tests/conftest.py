@@ -36,7 +36,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
 
 # Typer builds all commands of `rds` for each line that a test types, at 0.1 s: here once, as each program does.
 if build := getattr(typer.testing, "_get_command", None):
-    typer.testing._get_command = cache(build)  # type: ignore[attr-defined]
+    typer.testing._get_command = cache(build)
 
 # A shell that runs the tests in the background has them ignore Ctrl-C, and nohup the end of a terminal; so would all
 # that they start.

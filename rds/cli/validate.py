@@ -113,17 +113,13 @@ def _show_crossed(crossed: list[CrossTestResult]) -> None:
     show_table("Cross-test", heads, rows, note)
 
 
-def _known(value: float) -> float | None:
-    """None for a figure that too short a log, or a response that is not finite, leaves undefined."""
-    return value if isfinite(value) else None
-
-
 def _weight(value: float) -> str:
     return f"{value:.3f}" if isfinite(value) else "–"
 
 
 def _show(made: Validation) -> None:
     from rds.cli.console import cell, show_table
+    from rds.identification.validate.criterion import known
 
     for name, a in made.assessments.items():
         errors = {"free run": a.free_run, "free run, velocity": a.velocity}
@@ -139,9 +135,9 @@ def _show(made: Validation) -> None:
     for name, ranking in made.rankings.items():
         rows = [
             [
-                *(r.name, str(r.counted), cell(_known(r.rmse))),
-                *(cell(_known(r.aicc_difference)), _weight(r.aicc_weight)),
-                *(cell(_known(r.bic_difference)), _weight(r.bic_weight)),
+                *(r.name, str(r.counted), cell(known(r.rmse))),
+                *(cell(known(r.aicc_difference)), _weight(r.aicc_weight)),
+                *(cell(known(r.bic_difference)), _weight(r.bic_weight)),
             ]
             for r in ranking.ranks
         ]

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, inf, log
+from math import exp, inf, isfinite, log
 
 import numpy as np
 
@@ -148,3 +148,8 @@ def _weights(values: Sequence[float]) -> list[float]:
         return [float("nan")] * len(values)
     sizes = [exp(-0.5 * (value - lowest)) if value < inf else 0.0 for value in values]
     return [size / sum(sizes) for size in sizes]
+
+
+def known(value: float) -> float | None:
+    """None for a figure that too short a log, or a response that is not finite, leaves undefined."""
+    return value if isfinite(value) else None

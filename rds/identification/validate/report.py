@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rds.core.atomic import write_files
+from rds.identification.validate.criterion import known
 from rds.identification.validate.verdict import Verdict, Word
 from rds.results.html import notes_list, table
 from rds.results.report import page
@@ -166,9 +167,9 @@ def _ranking(ranking: Ranking) -> str:
             r.name,
             r.counted,
             r.fitted_here,
-            *map(_known, (r.rmse, r.aicc, r.aicc_difference)),
+            *map(known, (r.rmse, r.aicc, r.aicc_difference)),
             _weight(r.aicc_weight),
-            *map(_known, (r.bic, r.bic_difference)),
+            *map(known, (r.bic, r.bic_difference)),
             _weight(r.bic_weight),
         ]
         for r in ranking.ranks
@@ -178,11 +179,6 @@ def _ranking(ranking: Ranking) -> str:
         "k counts what was estimated from these data: variance, initial state, and parameters if fitted here."
     )
     return table(columns, rows, note=note) + notes_list(ranking.warnings)
-
-
-def _known(value: float) -> float | None:
-    """None for a figure that too short a log, or a response that is not finite, leaves undefined."""
-    return value if isfinite(value) else None
 
 
 def _weight(value: float) -> str | None:
