@@ -49,7 +49,7 @@ def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str]) -> list[frozenset
     for statement in body:
         here = now
         if isinstance(statement, followed.FUNCTIONS):
-            if _used_within(statement) & now or reads_file(statement):
+            if used_within(statement) & now or reads_file(statement):
                 now = now | {statement.name} - wanted
             elif statement.name in now - code:
                 now -= {statement.name}
@@ -79,8 +79,8 @@ def _writes(opened: ast.Call) -> bool:
     )
 
 
-def _used_within(function: ast.stmt) -> set[str]:
-    """The names of the notebook that a function uses: not its own, which may be called the same."""
+def used_within(function: ast.AST) -> set[str]:
+    """The names of the notebook that a function or a class uses: not its own, which may be called the same."""
     tables, found = symtable.symtable(ast.unparse(function), "notebook", "exec").get_children(), set()
     while tables:
         table = tables.pop()

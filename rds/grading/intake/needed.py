@@ -196,7 +196,10 @@ def _rebound(statement: ast.stmt, functions: Mapping[str, ast.FunctionDef]) -> s
     trees = at_once(statement)
     named = {each.id for tree in trees for each in ast.walk(tree) if isinstance(each, ast.Name)}
     found = {name for each in named & functions.keys() for name in _effect(functions[each]).names}
-    return found.union(*(stored(tree) for tree in trees))
+    if isinstance(statement, followed.FUNCTIONS):
+        found.add(statement.name)
+    patterns = (each for tree in trees for each in ast.walk(tree) if isinstance(each, ast.MatchAs | ast.MatchStar))
+    return found.union({each.name for each in patterns if each.name}, *map(stored, trees))
 
 
 def _reads_file_at_once(statement: ast.stmt) -> bool:
