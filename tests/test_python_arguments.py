@@ -16,6 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 import rds
+from rds.cli.common import say_what_is_replaced
 from rds.cli.main import app
 from rds.interpolators.acceleration import make_acceleration
 from rds.machines.machine import load_machine as loaded
@@ -308,12 +309,14 @@ def test_what_a_command_lacks_is_named(command: str, said: str) -> None:
     assert refused.exit_code == 2 and said in refused.stderr, refused.output
 
 
-def test_a_table_of_somebody_else_s_is_not_replaced_by_a_run_s(here: Path) -> None:
+def test_a_table_of_somebody_else_s_is_not_replaced_by_a_run_s(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "mine").mkdir()
     (here / "mine" / "result.csv").write_text("time,position\n0,0\n")
     with pytest.raises(rds.InputError, match=r"mine/result.csv: is there already, and is no result of a run; name ano"):
         short().run(out="mine")
     assert (here / "mine" / "result.csv").read_text() == "time,position\n0,0\n"
+    say_what_is_replaced(Path("mine"))
+    assert not capsys.readouterr().err  # nothing is
     short().run(out="ours")
     (here / "ours" / "result.json").unlink()
     assert short().run(out="ours").length == 0.5

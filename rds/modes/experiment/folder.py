@@ -34,18 +34,25 @@ def require_writable(folder: str | Path) -> None:
         with tempfile.TemporaryFile(dir=place):
             pass
         table = folder / "result.csv"
-        if table.is_file() and not _is_of_a_run(table):
+        if _is_foreign(table):
             raise InputError("is there already, and is no result of a run; name another folder", str(table))
     except OSError as error:
         said = error.strerror or error
         raise InputError(f"results cannot be written there ({said}); name another folder", str(folder)) from error
 
 
-def _is_of_a_run(table: Path) -> bool:
+def _is_foreign(table: Path) -> bool:
+    if not table.is_file() or table.with_suffix(".json").exists():
+        return False
     with table.open("rb") as file:
-        return file.read(len(_HEADING)) == _HEADING or table.with_suffix(".json").exists()
+        return file.read(len(_HEADING)) != _HEADING
 
 
 def holds_result(folder: str | Path) -> bool:
     """Whether a run has left its result or its record there, which another run into it replaces."""
+    try:
+        if _is_foreign(Path(folder) / "result.csv"):  # then no run goes into it
+            return False
+    except OSError:  # told where the run would write
+        return False
     return any(any(Path(folder).glob(pattern)) for pattern in ("result.*", "record.rds"))
