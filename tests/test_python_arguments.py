@@ -16,6 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 import rds
+from rds.cli.common import say_what_is_replaced
 from rds.cli.main import app
 from rds.interpolators.acceleration import make_acceleration
 from rds.machines.machine import load_machine as loaded
@@ -317,12 +318,16 @@ def test_what_a_command_lacks_is_named(command: str, said: str) -> None:
         ("result.json", "{}"),
     ],
 )
-def test_a_table_of_somebody_else_s_is_not_replaced_by_a_run_s(here: Path, name: str, text: str) -> None:
+def test_a_table_of_somebody_else_s_is_not_replaced_by_a_run_s(
+    here: Path, capsys: pytest.CaptureFixture[str], name: str, text: str
+) -> None:
     (here / "mine").mkdir()
     (here / "mine" / name).write_text(text)
     with pytest.raises(rds.InputError, match=rf"mine/{name}: is there already, and is no result of a run; name anothe"):
         short().run(out="mine")
     assert (here / "mine" / name).read_text() == text
+    say_what_is_replaced(Path("mine"))
+    assert not capsys.readouterr().err  # nothing is
 
 
 @pytest.mark.parametrize("left", ["result.csv", "result.json"])

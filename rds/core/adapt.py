@@ -188,8 +188,18 @@ def _is_alike_everywhere(params: Any) -> bool:
         return False
     left = np.vstack([np.eye(len(A)) - A, C])
     right = np.concatenate([B @ place, -D @ place])
+    # in states and equations of like size: beside 1e12 V, whatever the last one asks for would count as rounding
+    rows = np.hstack([left, np.vstack([B, D]) * place])
+    left, right = left / _sizes_of(rows)[:, None], right / _sizes_of(rows)
+    left = left / _sizes_of(left.T)
     state = np.linalg.lstsq(left, right, rcond=None)[0]
     return bool(np.abs(left @ state - right).max() <= _SAME * (np.abs(left) @ np.abs(state) + np.abs(right)).max())
+
+
+def _sizes_of(rows: np.ndarray) -> np.ndarray:
+    """The largest magnitude in each row; 1 for one of zeros."""
+    largest = np.abs(rows).max(axis=1)
+    return np.where(largest > 0.0, largest, 1.0)
 
 
 def _control_from_origin(t: float, r: Reference, y: float, state: Sequence[float], params: Any) -> tuple[float, Any]:

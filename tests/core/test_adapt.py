@@ -226,3 +226,17 @@ def test_a_law_with_a_force_of_its_place_takes_positions_as_they_are() -> None:
     law = as_controller(spring, T)
     u, state = law.control(0.0, Reference(30.0, 0.0, 0.0), 30.0, law.initial_state, law.params)
     assert u == 0.0 and state == (3.0,)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-6, 1.0, 1e6, 1e12])
+def test_whether_a_law_has_a_place_of_its_own_does_not_depend_on_the_sizes_of_its_states(scale: float) -> None:
+    """Beside states of 1e12, the spring's force counted as rounding, and was taken from where the axis stood."""
+    spring = control.ss([[0.9]], [[0.0, 0.1 * scale]], [[0.1 / scale]], [[20.0, -21.0]], T)
+    law = as_controller(spring, T)
+    assert law.control(0.0, Reference(30.0, 0.0, 0.0), 30.0, law.initial_state, law.params)[0] == -30.0
+    system = tracking_controller_system(TAU, K, [-32 + 24j, -32 - 24j], -320.0, T)
+    sizes = np.diag([scale ** (-1) ** n for n in range(system.nstates)])
+    A, B, C = sizes @ system.A @ np.linalg.inv(sizes), sizes @ system.B, system.C @ np.linalg.inv(sizes)
+    observer = as_controller(control.ss(A, B, C, system.D, T), T)
+    start = observer.initial_state
+    assert observer.control(0.0, Reference(64.0, 0.0, 0.0), 64.0, start, observer.params)[0] == 0.0

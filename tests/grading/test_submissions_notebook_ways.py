@@ -205,6 +205,10 @@ MODEL = 'def derivatives(t, x, u, params):\n    return [x[1], (params["K"] * u[0
         "data = np.load('log.npz')\nu, v = data['u'], data['v']\nK, offset = np.polyfit(u, v, 1)\nK = 1.6\nparams['K'] = K",
         "if __name__ == '__main__':\n    params['K'] = 1.6",
         "if ('__main__' == __name__): params['K'] = 1.6",
+        "for _ in range(1):\n    if __name__ == '__main__' and params:\n        params['K'] = 1.6",
+        "params['K'] = 1.6 if __name__ == '__main__' else 2.0",
+        "__name__ = 'trial'\nif __name__ == 'trial':\n    params['K'] = 1.6",
+        "def back():\n    params['K'] = 2.0\nparams['K'] = fit.params['K']\nback()\nparams['K'] = 1.6",
         "K = 1.6\nparams['K'] = K\nif __name__ == '__main__':\n    found = rds.run(params)\n    print(found)",
         "with open('log.csv') as file:\n    K = float(file.read())\nK = 1.6\nparams['K'] = K",
         "df = pd.read_csv('log.csv')\nfrom scipy.optimize import least_squares\ndef residuals(p):\n    return df.v - p[0] * df.u\nresult = least_squares(residuals, [1.0])\nK = result.x[0]\nK = 1.6\nparams['K'] = K",
@@ -239,6 +243,19 @@ def test_a_fitted_parameter_that_is_set_again_by_hand_is_graded(cell: str) -> No
         "K = 1.0\ndef own(x):\n    return K * x\nK = fit.params['K']\ngains = list(map(own, [1.0]))\nK = 1.6\nparams['K'] = gains[0]",
         "K = 1.0\nK = fit.params['K']\nclass Gains:\n    own = K\nK = 1.6\nparams['K'] = Gains.own",
         "params['K'] = np.loadtxt('log.csv')[0]",
+        # by another name, a function's argument, or a function of a function
+        "q = params\nq['tau'], params['K'] = fit.params.values()\nparams['K'] = 1.6",
+        "put = params.update\nparams['K'] = (put(tau=fit.tau), fit.K)[1]\nparams['K'] = 1.6",
+        "def take(p):\n    p['tau'] = fit.tau\n    params['K'] = 2.0\ntake(params)\nparams['K'] = 1.6",
+        "def take():\n    params['tau'] = fit.tau\ndef both():\n    params['K'] = fit.K\n    take()\nboth()\nparams['K'] = 1.6",
+        "params['lag'] = 1.0\nfor key in list(params):\n    params[key] = fit.params[key]\nparams['K'] = 1.6\nparams['tau'] = 0.01",
+        # read by a function, its default, or a class, before it is set again
+        "def K():\n    return params['K']\nparams['K'] = fit.K\nparams['tau'] = 0.016 / K()\nparams['K'] = 1.6",
+        "params['K'] = fit.K\ndef tau(K=params['K']):\n    return 0.016 / K\nparams['K'] = 1.6\nparams['tau'] = tau()",
+        "params['K'] = fit.K\nclass Axis:\n    tau = 0.016 / params['K']\nparams['K'] = 1.6\nparams['tau'] = Axis.tau",
+        # bound anew by a decorator and by a pattern that are not there
+        "def gain():\n    return 1.0\n@rds.fast\ndef gain():\n    return 1.6\nparams['K'] = gain()",
+        "K = 1.0\nmatch fit.K:\n    case K:\n        pass\nparams['K'] = K",
         "if __name__ == '__main__':\n    params['K'] = fit.params['K']",
     ],
 )

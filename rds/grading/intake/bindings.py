@@ -81,8 +81,8 @@ def _writes(opened: ast.Call) -> bool:
     )
 
 
-def used_within(function: ast.stmt) -> set[str]:
-    """The names of the notebook that a function uses: not its own, which may be called the same."""
+def used_within(function: ast.AST) -> set[str]:
+    """The names of the notebook that a function or a class uses: not its own, which may be called the same."""
     tables, found = symtable.symtable(ast.unparse(function), "notebook", "exec").get_children(), set()
     while tables:
         table = tables.pop()

@@ -28,7 +28,7 @@ from rds.grading.intake.bindings import (
     root,
     stored,
 )
-from rds.grading.intake.overwritten import is_set_again
+from rds.grading.intake.overwritten import SetAgain
 
 _BY_FIRST_ARGUMENT = frozenset({"setattr", "delattr", "setitem", "delitem"})
 """Functions that change their first argument, whatever module they are taken from."""
@@ -78,8 +78,9 @@ def needed(body: Sequence[ast.stmt], wanted: set[str]) -> tuple[set[int], tuple[
     distinct = {id(names): names for names in absent}
     wider = {number: names | elsewhere.keys() for number, names in distinct.items()}
     there_too = [wider[id(names)] for names in absent]
-    _follow(body, makes, keep, known, there_too)
-    _leave_out(body, makes, keep, there_too)
+    is_set_again = SetAgain(body)
+    _follow(body, makes, keep, known, there_too, is_set_again)
+    _leave_out(body, makes, keep, there_too, is_set_again)
     able = _able(body, keep, there_too)
     left_out = set()
     functions = {each.name: each for each in body if isinstance(each, ast.FunctionDef)}
@@ -87,7 +88,7 @@ def needed(body: Sequence[ast.stmt], wanted: set[str]) -> tuple[set[int], tuple[
         if name in elsewhere and elsewhere[name].names & known:
             left_out.add(name)
             given = _from_experiments(functions[name], there_too[number]) & elsewhere[name].names & known
-            if given and not is_set_again(body, able, number, given):
+            if given and not is_set_again(able, number, given):
                 raise NotFollowed(body[number].lineno, _NEEDS_MORE)
     return keep, tuple(sorted(left_out))
 
@@ -119,7 +120,12 @@ class _Makers:
 
 
 def _follow(
-    body: Sequence[ast.stmt], makes: _Makers, keep: set[int], known: set[str], absent: Sequence[Set[str]]
+    body: Sequence[ast.stmt],
+    makes: _Makers,
+    keep: set[int],
+    known: set[str],
+    absent: Sequence[Set[str]],
+    is_set_again: SetAgain,
 ) -> None:
     """Keep also what may change the data in ways that its text does not name. NotFollowed where that cannot be run."""
     modules = dict(chain.from_iterable(map(imported, body)))
@@ -148,14 +154,16 @@ def _follow(
     able = _able(body, keep, absent)
     for number in sorted(blocked):
         named = followed.names_in(body[number]) & seen.data & known
-        if not is_set_again(body, able, number, named or makes.wanted & seen.data):
+        if not is_set_again(able, number, named or makes.wanted & seen.data):
             raise NotFollowed(body[number].lineno, _NEEDS_MORE)
 
 
 _NEEDS_MORE = "it may change what is graded, and needs files or modules that are not there"
 
 
-def _leave_out(body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent: Sequence[Set[str]]) -> None:
+def _leave_out(
+    body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent: Sequence[Set[str]], is_set_again: SetAgain
+) -> None:
     """Leave out what cannot be run, where what it makes is set again later, or used only by what is left out as well.
 
     NotFollowed where it is neither.
@@ -165,10 +173,11 @@ def _leave_out(body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent:
     used = _used(body, makes, keep)
     modules = {name for statement in body for name, _ in imported(statement)}
     functions = {each.name: each for each in body if isinstance(each, ast.FunctionDef)}
+    changeable = mutable(body, used | makes.wanted, functions.keys())
     for number in unable:
         made = (makes.facts[number][0] & (used | makes.wanted)) - modules
-        made &= mutable(body, made, functions.keys()) | _rebound(body[number], functions)
-        if not is_set_again(body, keep, number, made):
+        made &= changeable | _rebound(body[number], functions)
+        if not is_set_again(keep, number, made):
             raise NotFollowed(body[number].lineno, _NEEDS_MORE)
     for number in sorted(keep):  # modules that only these needed
         names = {name for name, _ in imported(body[number])}
@@ -192,7 +201,10 @@ def _rebound(statement: ast.stmt, functions: Mapping[str, ast.FunctionDef]) -> s
     trees = at_once(statement)
     named = {each.id for tree in trees for each in ast.walk(tree) if isinstance(each, ast.Name)}
     found = {name for each in named & functions.keys() for name in _effect(functions[each]).names}
-    return found.union(*(stored(tree) for tree in trees))
+    if isinstance(statement, followed.FUNCTIONS):
+        found.add(statement.name)
+    patterns = (each for tree in trees for each in ast.walk(tree) if isinstance(each, ast.MatchAs | ast.MatchStar))
+    return found.union({each.name for each in patterns if each.name}, *map(stored, trees))
 
 
 def _reads_file_at_once(statement: ast.stmt) -> bool:

@@ -196,17 +196,18 @@ def _with_single_imports(text: str) -> str:
 
 
 def _as_main(text: str) -> str:
-    """The text with `if True:` in place of `if __name__ == "__main__":`, which holds in a notebook that is run."""
-    lines = text.split("\n")
-    for statement in ast.parse(text).body:
-        if not isinstance(statement, ast.If) or not isinstance(statement.test, ast.Compare):
-            continue
-        test, at = statement.test, statement.lineno - 1
-        if ast.unparse(test) in ("__name__ == '__main__'", "'__main__' == __name__") and test.end_lineno == at + 1:
-            line = _encoded(lines[at])  # columns are counted in bytes
-            line = line[: test.col_offset] + b"True" + line[test.end_col_offset :]
-            lines[at] = line.decode("utf-8", "surrogatepass")
-    return "\n".join(lines)
+    """The text with "__main__" in place of `__name__`: so it is in a notebook that is run, wherever it is asked."""
+    lines = [_encoded(line) for line in text.split("\n")]  # columns are counted in bytes
+    tree = ast.parse(text)
+    within = {id(each) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for each in ast.walk(node)}
+    names = [each for each in ast.walk(tree) if isinstance(each, ast.Name) and each.id == "__name__"]
+    if any(not isinstance(each.ctx, ast.Load) for each in names):
+        return text
+    for each in sorted(names, key=lambda name: (name.lineno, name.col_offset), reverse=True):
+        if id(each) not in within:  # a text in a text needs other quotation marks
+            line = lines[each.lineno - 1]
+            lines[each.lineno - 1] = line[: each.col_offset] + b'"__main__"' + line[each.end_col_offset :]
+    return "\n".join(line.decode("utf-8", "surrogatepass") for line in lines)
 
 
 def _only(text: str, body: Sequence[ast.stmt], keep: set[int]) -> str:

@@ -13,6 +13,8 @@ from itertools import chain
 
 from rds.grading.intake.bindings import CHANGING, at_once, bound, root, stored, used_within
 
+_DEFINITIONS = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+
 
 @dataclass(frozen=True)
 class _Set:
@@ -22,47 +24,84 @@ class _Set:
     keys: frozenset[object] | None = None
 
 
-def is_set_again(body: Sequence[ast.stmt], later: Iterable[int], number: int, names: Iterable[str]) -> bool:
-    """Whether the statements `later` set all of `names` that statement `number` sets, before one of them reads it."""
-    after = sorted(each for each in later if each > number)
-    functions = {each.name: each for each in body if isinstance(each, ast.FunctionDef)}
-    return all(_is_set_again(body, after, number, name, functions) for name in names)
+class SetAgain:
+    """Asked of one notebook, statement by statement; what is the same for all of them is looked up once."""
+
+    def __init__(self, body: Sequence[ast.stmt]) -> None:
+        self._body = body
+        self._code = {each.name: each for each in body if isinstance(each, _DEFINITIONS)}
+        self._has_another_name: dict[str, bool] = {}
+        self._reads: dict[int, set[str]] = {}
+
+    def __call__(self, later: Iterable[int], number: int, names: Iterable[str]) -> bool:
+        """Whether the statements `later` set all of `names` that statement `number` sets, before one reads it."""
+        after = sorted(each for each in later if each > number)
+        return all(self._is_set_again(after, number, name) for name in names)
+
+    def _is_set_again(self, after: Sequence[int], number: int, name: str) -> bool:
+        body, code = self._body, self._code
+        if name not in self._has_another_name:
+            self._has_another_name[name] = _has_another_name(body, name)
+        keys = frozenset() if self._has_another_name[name] else _keys_set(body[number], name, code)
+        left = keys or _keys_there(body[:number], name)
+        for each in after:
+            if each not in self._reads:
+                self._reads[each] = _read(body[each], code)
+            if name in self._reads[each]:
+                return False
+            for one in _plainly_set(body[each]):
+                if one.name != name:
+                    continue
+                if one.keys is None:
+                    return True
+                if left and not (left := left - one.keys):
+                    return True
+        return False
 
 
-def _is_set_again(
-    body: Sequence[ast.stmt], after: Sequence[int], number: int, name: str, functions: Mapping[str, ast.FunctionDef]
-) -> bool:
-    left = _keys_set(body[number], name, functions) or _keys_there(body[:number], name)
-    for each in after:
-        sets = [one for one in _plainly_set(body[each]) if one.name == name]
-        if name in _read(body[each], functions):
-            return False
-        for one in sets:
-            if one.keys is None:
-                return True
-            if left and not (left := left - one.keys):
-                return True
-    return False
+def _has_another_name(body: Sequence[ast.stmt], name: str) -> bool:
+    """Whether the object `name`, or what changes it, is given another name, as in `put = params.update`."""
+    return any(_hands_on(bound(node)[1], name) for node in chain.from_iterable(map(ast.walk, body)))
 
 
-def _keys_set(statement: ast.stmt, name: str, functions: Mapping[str, ast.FunctionDef]) -> frozenset[object]:
+def _hands_on(value: ast.AST | None, name: str) -> bool:
+    if isinstance(value, ast.Name | ast.Attribute):
+        return root(value) == name
+    if isinstance(value, ast.Call | ast.Subscript | ast.Lambda | None):  # an experiment has a table of its own
+        return False
+    return any(_hands_on(each, name) for each in ast.iter_child_nodes(value))
+
+
+def _run_by(statement: ast.stmt, code: Mapping[str, ast.stmt]) -> list[ast.AST]:
+    """What runs where a statement stands, with the functions and classes of the notebook that it names."""
+    found: list[ast.AST] = [*at_once(statement)]
+    done: set[str] = set()
+    for tree in found:  # it grows
+        named = {each.id for each in ast.walk(tree) if isinstance(each, ast.Name)} & code.keys() - done
+        done |= named
+        found += [code[each] for each in sorted(named)]
+    return found
+
+
+def _keys_set(statement: ast.stmt, name: str, code: Mapping[str, ast.stmt]) -> frozenset[object]:
     """The keys of the table `name` that a statement sets, with the functions that it names; none if it may set all."""
-    trees = [*at_once(statement)]
-    named = {each.id for tree in trees for each in ast.walk(tree) if isinstance(each, ast.Name)}
-    trees += [functions[each] for each in named & functions.keys()]
     keys: set[object] = set()
-    for node in chain.from_iterable(map(ast.walk, trees)):
+    for node in chain.from_iterable(map(ast.walk, _run_by(statement, code))):
         if isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load) and root(node) == name:
             if not isinstance(node.value, ast.Name) or not isinstance(node.slice, ast.Constant):
                 return frozenset()
             keys.add(node.slice.value)
         elif isinstance(node, ast.Name | ast.Attribute) and not isinstance(node.ctx, ast.Load) and root(node) == name:
             return frozenset()
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and root(node.func) == name:
-            given = _keys_given(node)
-            if node.func.attr in CHANGING and (node.func.attr != "update" or given is None):
+        elif isinstance(node, ast.Call):
+            given = [*node.args, *(word.value for word in node.keywords)]
+            if root(node.func) in code and any(_hands_on(each, name) for each in given):
                 return frozenset()
-            keys |= (given if node.func.attr == "update" else None) or set()
+            if isinstance(node.func, ast.Attribute) and root(node.func) == name:
+                known = _keys_given(node)
+                if node.func.attr in CHANGING and (node.func.attr != "update" or known is None):
+                    return frozenset()
+                keys |= (known if node.func.attr == "update" else None) or set()
     return frozenset(keys)
 
 
@@ -133,29 +172,31 @@ def _keys_given(called: ast.Call) -> set[object] | None:
     return keys
 
 
-def _read(statement: ast.stmt, functions: Mapping[str, ast.FunctionDef]) -> set[str]:
-    """The names whose values a statement uses where it stands, also by the functions that it names.
+def _read(statement: ast.stmt, code: Mapping[str, ast.stmt]) -> set[str]:
+    """The names whose values a statement uses where it stands: not those whose parts it only sets."""
+    trees = [*_run_by(statement, code), *_run_by_definition(statement)]
+    found: set[str] = set()
+    for tree in trees:
+        read = _loaded(tree)
+        found |= read & used_within(tree) if isinstance(tree, _DEFINITIONS) else read
+    return found
 
-    Not those whose parts it only sets.
-    """
+
+def _loaded(tree: ast.AST) -> set[str]:
     only_set: set[int] = set()
-    if isinstance(statement, ast.Assign | ast.AnnAssign):
-        parts = chain.from_iterable(map(ast.walk, bound(statement)[0]))
-        only_set = {id(part.value) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)}
-    elif isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
-        function = statement.value.func
-        if isinstance(function, ast.Attribute) and function.attr == "update":
-            only_set = {id(function.value)}
-    found = set()
-    for node in chain.from_iterable(map(ast.walk, [*at_once(statement), *_run_by_definition(statement)])):
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and id(node) not in only_set:
-            found.add(node.id)
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            parts = chain.from_iterable(map(ast.walk, bound(node)[0]))
+            only_set |= {id(part.value) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)}
+        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+            function = node.value.func
+            if isinstance(function, ast.Attribute) and function.attr == "update":
+                only_set.add(id(function.value))
         elif isinstance(node, ast.AugAssign):
             found |= {root(node.target), *stored(node.target)}
-    called: set[str] = set()
-    while more := (found & functions.keys()) - called:
-        called |= more
-        found = found.union(*(used_within(functions[each]) for each in more))
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and id(node) not in only_set:
+            found.add(node.id)
     return found
 
 

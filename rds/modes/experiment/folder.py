@@ -35,12 +35,17 @@ def require_writable(folder: str | Path) -> None:
             place = place.parent
         with tempfile.TemporaryFile(dir=place):
             pass
-        there = [folder / name for name in _FILES if (folder / name).is_file()]
-        if there and not any(map(_is_of_a_run, there)):
-            raise InputError("is there already, and is no result of a run; name another folder", str(there[0]))
+        if foreign := _foreign(folder):
+            raise InputError("is there already, and is no result of a run; name another folder", str(foreign))
     except OSError as error:
         said = error.strerror or error
         raise InputError(f"results cannot be written there ({said}); name another folder", str(folder)) from error
+
+
+def _foreign(folder: Path) -> Path | None:
+    """A file that a run would replace there, and that is none of an earlier run's."""
+    there = [folder / name for name in _FILES if (folder / name).is_file()]
+    return there[0] if there and not any(map(_is_of_a_run, there)) else None
 
 
 def _is_of_a_run(path: Path) -> bool:
@@ -50,4 +55,9 @@ def _is_of_a_run(path: Path) -> bool:
 
 def holds_result(folder: str | Path) -> bool:
     """Whether a run has left its result or its record there, which another run into it replaces."""
+    try:
+        if _foreign(Path(folder)):  # then no run goes into it
+            return False
+    except OSError:  # told where the run would write
+        return False
     return any(any(Path(folder).glob(pattern)) for pattern in ("result.*", "record.rds"))
