@@ -57,7 +57,8 @@ def job(
     else:
         typer.echo(f"{found['file']}: {len(found['operations'])} operations")
         for number, operation in enumerate(found["operations"], start=1):
-            typer.echo(f"{number}: {operation['title']}; {operation['length_mm']:.1f} mm at feed")
+            contours = f"; {operation['length_mm']:.1f} mm at feed" if operation["length_mm"] else ""  # holes have none
+            typer.echo(f"{number}: {operation['title']}{contours}")
             for note in operation["notes"]:
                 typer.echo(f"   note: {note}")
     for note in found["notes"]:
