@@ -42,9 +42,7 @@ def ode_model(
     start = _initial_state(initial_state)
     own = dict(params or {})
     return Model(
-        advance=partial(
-            _advance_by_rk4, derivatives=derivatives, substeps=substeps, where=source.path if source else None
-        ),
+        advance=partial(_advance_by_rk4, derivatives=derivatives, substeps=substeps, where=_place(source)),
         initial_state=start,
         params=own,
         output=_output(output, own),

@@ -21,10 +21,12 @@ from rds.identification.validate.alternatives import with_alternatives
 from rds.identification.validate.assessment import assess
 from rds.identification.validate.candidate import as_candidate
 from rds.identification.validate.conclusion import overall
+from rds.identification.validate.discrepancy import Off
 from rds.identification.validate.judge import judge
 from rds.identification.validate.same_data import overlap
 from rds.identification.validate.validate import Validation, validate
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
+from rds.identification.validate.within import frequency_told
 from tests.validation.validation_logs import STEP, T, X, candidate, log, moved, square
 
 FRESH = square(8.0, 3.0, 0.7)
@@ -50,6 +52,15 @@ def test_the_true_model_is_valid_on_data_of_another_signal() -> None:
     assert first == found.verdict.sentence and len(reasons) == len(found.verdict.reasons)
     sides = [line.split(":")[0] for line in reasons]
     assert sides == sorted(sides, key=["- cannot tell", "- against", "- for", "- note"].index)
+
+
+def test_a_limit_in_hz_is_below_the_frequency_at_which_the_phase_is_open() -> None:
+    """By a lag of microseconds alone, a phase that may be 7° off at 8 Hz would be within 4° up to hundreds of Hz."""
+    a = assess(candidate(), log(FRESH))
+    assert a.as_axis is not None and frequency_told(a, Bands()) is None
+    open_phase = replace(a.as_axis, phase=Off(1.0, 3.0, "°"), lag=Off(1e-6, 1e-6, "s"))
+    told = frequency_told(replace(a, as_axis=open_phase, as_motion=None), Bands())
+    assert told == pytest.approx(a.as_axis.frequency * 4.0 / 7.0)
 
 
 def test_a_gain_that_is_a_per_cent_off_simulates_but_leaves_a_residual_that_follows_the_command() -> None:
