@@ -22,6 +22,7 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from rds.core.private_files import keep_process_private, share
+from rds.core.progress import Progress as TellsProgress
 from rds.core.quantities import Quantity
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -152,7 +153,7 @@ def _stdout_to_stderr() -> Iterator[None]:
 
 
 @contextmanager
-def progress_bars() -> Iterator[Callable[[str], Callable[[int, int], None]]]:
+def progress_bars() -> Iterator[Callable[[str], TellsProgress]]:
     """Makes a progress function for a named stage: a bar on a terminal, nothing in a pipe."""
     if not sys.stderr.isatty():
         yield lambda name: lambda done, of: None
@@ -163,7 +164,7 @@ def progress_bars() -> Iterator[Callable[[str], Callable[[int, int], None]]]:
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
 
-        def bar(name: str) -> Callable[[int, int], None]:
+        def bar(name: str) -> TellsProgress:
             task = bars.add_task(name, total=None)
             return lambda done, of: bars.update(task, completed=done, total=of)
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.progress import Progress
 from rds.core.types import Verdict
 from rds.machines import load_machine
 from rds.modes import SIMULATION, mode_names
@@ -58,7 +59,7 @@ class Demo:
         }
 
 
-def run_demo(folder: Path, bar: Callable[[str], Callable[[int, int], None]], duration: float = DURATION) -> Demo:
+def run_demo(folder: Path, bar: Callable[[str], Progress], duration: float = DURATION) -> Demo:
     """Run the experiment in all modes and write tables, plots and a report into `folder`."""
     experiment = Experiment(
         axis=AXES,

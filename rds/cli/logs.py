@@ -6,10 +6,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rds.core.progress import Progress
+
 if TYPE_CHECKING:
     from rds.identification.logs.log import Log
 
-Bar = Callable[[str], Callable[[int, int], None]]
+Bar = Callable[[str], Progress]
 
 
 def read_logs(paths: Sequence[Path], map_: Path | None, axis: str | None, bar: Bar) -> list[Log]:
@@ -17,7 +19,7 @@ def read_logs(paths: Sequence[Path], map_: Path | None, axis: str | None, bar: B
     return [log for path in paths for log in _of_file(path, map_, axis, bar(f"reading {path.name}"))]
 
 
-def _of_file(path: Path, map_: Path | None, axis: str | None, progress: Callable[[int, int], None]) -> list[Log]:
+def _of_file(path: Path, map_: Path | None, axis: str | None, progress: Progress) -> list[Log]:
     from rds.core.errors import InputError
     from rds.identification.logs.read_log import read_log
 

@@ -6,7 +6,7 @@ import json as json_text
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,6 +19,7 @@ from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, P
 from rds.core.shared_quantities import SAMPLE_PERIOD
 
 if TYPE_CHECKING:
+    from rds.core.progress import Progress
     from rds.interpolators.motion.limiting import Explained
     from rds.machines import Machine
     from rds.nc.compensation.proof import Proof
@@ -234,7 +235,7 @@ def time(
         notes: list[str] = []
         with progress_bars() as bar:
             found = cycle_time(motion(file, of, what, bar("plan"), notes), of, sample_period, profile)
-        held, picture = _why(file, of, what, found, profile) if why else (None, None)
+            held, picture = _why(file, of, what, found, profile, bar) if why else (None, None)
     if json:
         print_json(
             {"program": str(file), "machine": of.name, "profile": profile, **found.to_json(), "notes": notes}
@@ -260,7 +261,9 @@ def time(
     raise typer.Exit(0 if found.certificate.ok else 1)
 
 
-def _why(file: Path, of: Machine, what: Setup, found: CycleTime, profile: str) -> tuple[Explained, Path]:
+def _why(
+    file: Path, of: Machine, what: Setup, found: CycleTime, profile: str, bar: Callable[[str], Progress]
+) -> tuple[Explained, Path]:
     """What holds the planned motion back, and the picture of its certificate."""
     from rds.core.errors import InputError
     from rds.interpolators.motion.limiting import explained
@@ -269,7 +272,7 @@ def _why(file: Path, of: Machine, what: Setup, found: CycleTime, profile: str) -
 
     if profile != "planned":
         raise InputError(f"--why tells of the planned motion, and not of --profile {profile}; leave that away")
-    held = explained(list(motion(file, of, what)), Limits.of(of), found.T)
+    held = explained(list(motion(file, of, what)), Limits.of(of), found.T, progress=bar("what holds it back"))
     path = file.with_name(f"{file.stem}-certificate.png")
     save_picture(found.certificate.plot(explained=held), path)
     return held, path

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from rds.core.atomic import write_files
 from rds.core.errors import InputError
 from rds.core.installed import version
+from rds.core.progress import Progress
 from rds.machines import Machine
 from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_compiled, write_compiled
 from rds.nc.configuration import configured
@@ -27,7 +28,6 @@ from rds.nc.validate import Validator
 from rds.nc.validation import Validation
 
 Item = MotionBlock | Call
-Progress = Callable[[int, int], None]
 _MOST_NOTES, _LONGEST_NOTE = 5, 300  # of a program, characters: they stand in the last line of the compiled form
 _LARGEST_READ_TWICE = 4 << 20  # bytes; larger programs are made by machines, and their subroutines are called
 _LONGEST_NAME = 200  # bytes, of a subroutine that may have a file

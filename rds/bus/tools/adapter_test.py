@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import ceil, floor, log10
 from pathlib import Path
@@ -21,6 +21,7 @@ import numpy as np
 from rds.bus.medium import error_reports
 from rds.bus.modules.rds import frames
 from rds.bus.tools.statistics import BITRATE, Statistics
+from rds.core.progress import Progress
 
 EDGES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # ms
 _LISTENS = 1.0  # s, before anything is asked
@@ -116,7 +117,7 @@ def examine(
     bitrate: int | None = None,
     count: int = 1000,
     channel: Any = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> AdapterReport:
     """Listen, find somebody who answers, ask `count` times, and judge. Nothing moves. can.CanError if the bus fails."""
     statistics = Statistics(bitrate or BITRATE)

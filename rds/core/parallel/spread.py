@@ -11,9 +11,9 @@ from rds.core.errors import InputError
 from rds.core.parallel.outcome import Outcome
 from rds.core.parallel.process import Work, WorkerProcess
 from rds.core.parallel.scheduler import Scheduler
+from rds.core.progress import Progress
 
 Item = TypeVar("Item")
-Progress = Callable[[int, int], None]  # items done, items in all
 
 RETRIES = 1
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.private_files import write_private
+from rds.core.progress import Progress
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.assignment.audit import audit
 from rds.grading.assignment.hand_out import promised
@@ -91,7 +92,7 @@ def check_assignment(
     assignment: Assignment,
     pool: Opener,
     seeds: int = SEEDS,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     audited: bool = True,
     announce: Callable[[str], None] = lambda text: None,
 ) -> AssignmentCheck:

@@ -14,7 +14,7 @@ from rds.core.atomic import write_files, write_whole
 from rds.core.errors import InputError
 from rds.core.parallel import Outcome, Scheduler, processors, spread
 from rds.core.parallel.process import WorkerProcess
-from rds.core.parallel.spread import Progress
+from rds.core.progress import Progress
 from rds.grading.assignment.assignment import COPY_SECRET, Assignment, read_assignment
 from rds.grading.assignment.assignment import FILE as ASSIGNMENT
 from rds.grading.assignment.late_rules import LateRules

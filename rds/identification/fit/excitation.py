@@ -12,13 +12,14 @@ error is least; their geometric mean along the axes of the confidence ellipsoid 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.progress import Progress
 from rds.core.quantities import Quantity
 from rds.identification.structures.structure import Structure
 from rds.machines.machine import Axis, Machine
@@ -36,8 +37,6 @@ _OPTIONS = {
     "duration": Quantity("length of the test", "s", above=0.0),
     "noise": Quantity("standard deviation of the output's noise beside rounding", "mm (rev/min)", low=0.0),
 }
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

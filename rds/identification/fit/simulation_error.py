@@ -18,6 +18,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.options import check_known
+from rds.core.progress import Progress
 from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.free_run_doubts import is_little
 from rds.identification.fit.made_estimate import made_estimate, t_quantile
@@ -172,7 +173,7 @@ def _checked(given: Mapping[str, Any], structure: Structure) -> dict[str, float]
     return values
 
 
-def _ticker(progress: Callable[[int, int], None] | None, structure: Structure, logs: int) -> Callable[[], None]:
+def _ticker(progress: Progress | None, structure: Structure, logs: int) -> Callable[[], None]:
     """Counts free runs; how many there will be is not known, only how many there can be."""
     if progress is None:
         return lambda: None

@@ -7,7 +7,7 @@ the cyclic messages (command.slot_0 ..., answer_2.position) and those of the dis
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,10 @@ from rds.bus.tools.log_formats import TEXTS
 from rds.bus.tools.logs import LogFile
 from rds.core.errors import InputError, MachineError
 from rds.core.limits import UNPACKED, allow
+from rds.core.progress import Progress
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.logs.table import Column, Table
 
-Progress = Callable[[int, int], None]
 Signal = tuple[str, str | None, float]
 _LOOK = 1 << 16  # frames between two looks at how much memory they take
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import re
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,13 +19,13 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.core.limits import LINE, lifted, refusal
+from rds.core.progress import Progress
 from rds.identification.logs.csv_cells import BLANKS, is_number, split
 from rds.identification.logs.csv_layout import Layout, in_rows, sniff
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.logs.table import Column, Table, since_first
 from rds.identification.logs.units import factor, unit_of_name
 
-Progress = Callable[[int, int], None]
 _BLOCK = 1 << 22  # bytes
 _TAIL = 1 << 14  # bytes at the end in which a cut is looked for
 _REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")

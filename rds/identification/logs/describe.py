@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.progress import Progress
 from rds.identification.logs.guess import draft, guess
 from rds.identification.logs.log import Clock, Finding, Gravity, Log
 from rds.identification.logs.map import LogMap
@@ -71,7 +72,7 @@ class Description:
 def describe(
     path: str | Path,
     mapping: LogMap | str | Path | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Description:
     """Describe a file, with or without a map.
 

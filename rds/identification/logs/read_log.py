@@ -6,17 +6,15 @@ FILE.map.toml, or guessed where names and units leave no doubt.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 
 from rds.core.errors import InputError
+from rds.core.progress import Progress
 from rds.identification.logs.log import Log
 from rds.identification.logs.map import LogMap, beside
 from rds.identification.logs.table import Table
 from rds.machines.machine import Machine
-
-Progress = Callable[[int, int], None]
 
 
 def read_log(

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 from rds.bus.tools.log_formats import ENDINGS as BUS_ENDINGS
 from rds.bus.tools.log_formats import READ_ONLY
 from rds.core.errors import InputError
+from rds.core.progress import Progress
 from rds.identification.logs.table import Table
 
-Progress = Callable[[int, int], None]
 TEXTS = (".csv", ".txt", ".dat", ".tsv", ".prn", ".lvm")
 MEASUREMENTS = (".mf4", ".mdf", ".dat")  # of which some are text, and some bus logs
 # what of other programs is not read, and which export of theirs is

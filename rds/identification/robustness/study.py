@@ -13,6 +13,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.parallel import Scheduler, processors, spread
+from rds.core.progress import Progress
 from rds.core.types import Model
 from rds.identification.robustness.draws import LEVEL, draws
 from rds.identification.robustness.figures import FIGURES
@@ -24,7 +25,6 @@ from rds.modes.experiment import Experiment
 MOST_RUNS = 10_000_000
 _STRETCHES = 16  # for each processor: progress, and an even load to the end
 _LONGEST = 500  # draws in a stretch
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from math import sqrt
+from math import inf, sqrt
 
 from rds.identification.fit.estimate import said_of_guesses
 from rds.identification.fit.kstep import over_noise
@@ -140,26 +140,26 @@ def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
         if measure.borderline and measure.told:
             limit += ", borderline"
         what = f"{_said_of(measure, found.frequency)}: ± {_shown(off.error, off.unit)} standard error; {limit}"
-        if off.value == float("inf"):
+        untold = f"this log does not tell the {measure.kind}: {what}"
+        if off.value == inf:
             what = _said_of(measure, found.frequency)
+        elif off.error == inf:
+            untold = f"this log does not tell the {measure.kind} at all; {limit}"
         if measure.wrong:
             yield Reason(Side.AGAINST, measure.kind, what)
         elif measure.told:
             yield Reason(Side.FOR, measure.kind, what)
-        elif measure.kind in ("gain", "speed") or (measure.kind == "phase" and measure.reach == float("inf")):
-            untold = f"this log does not tell the {measure.kind}: {what}"
+        elif measure.kind in ("gain", "speed") or (measure.kind == "phase" and measure.reach == inf):
             yield Reason(Side.CANNOT_TELL, f"{measure.kind}-unidentifiable", untold)
         else:
-            yield Reason(
-                Side.NOTE, f"{measure.kind}-unidentifiable", f"this log does not tell the {measure.kind}: {what}"
-            )
+            yield Reason(Side.NOTE, f"{measure.kind}-unidentifiable", untold)
 
 
 def _said_of(measure: Measure, frequency: float) -> str:
     """A clause: what the model is off by."""
     value = measure.off.value
     size, more = _shown(abs(value), measure.off.unit), value > 0.0
-    if measure.kind in ("gain", "speed") and value == float("inf"):
+    if measure.kind in ("gain", "speed") and value == inf:
         return "the axis does not move as the model does, or moves the other way"
     if measure.kind == "gain":
         where = f" at {measure.off.at:.2g} Hz" if measure.off.at > 0.0 else ""

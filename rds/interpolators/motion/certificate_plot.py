@@ -28,8 +28,10 @@ def plot_certificate(
         drawn = Picture(7.6)
         grid = drawn.subplots(4, 1, sharex=True)
     else:
-        drawn = Picture(12.0)
-        top, below, *grid = drawn.subplots(6, 1, height_ratios=[3, 2, 2, 2, 2, 2])
+        # inches: of the causes each is one line of text
+        lines = max(0.24 * (len(explained.limiting.seconds) + 1), 1.7)
+        drawn = Picture(10.3 + lines)
+        top, below, *grid = drawn.subplots(6, 1, height_ratios=[2.55, lines, 1.7, 1.7, 1.7, 1.7])
         explained.limiting.draw(top, below)
         drawn.suptitle("\n".join(explained.savings()), fontsize="medium")
         below.sharex(top)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rds.core.progress import Progress
 from rds.interpolators.motion.least_time import LeastTime
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.pieces import BEND, DISTANCE, RATIO, SLOPE, TWIST
@@ -28,6 +30,7 @@ SAVED = 1.0  # s
 ASKED = 3  # limits
 MOST_TIMES = 16.0  # that a limit is raised to, when a second is looked for
 _ROUNDS = 10
+_PLANS = 2 + _ROUNDS  # that one limit takes at most; one that saves nothing takes two
 
 
 @dataclass(frozen=True)
@@ -151,14 +154,21 @@ def limiting(blocks: Sequence[Any], limits: Limits, T: float) -> Limiting:
     )
 
 
-def to_save(blocks: Sequence[Any], limits: Limits, T: float, kind: str, axis: str) -> float | None:
-    """How many times a limit of an axis would have to be what it is to save a second; None where it never does."""
+def to_save(
+    blocks: Sequence[Any], limits: Limits, T: float, kind: str, axis: str, planned: Callable[[], None] = lambda: None
+) -> float | None:
+    """How many times a limit of an axis would have to be what it is to save a second; None where it never does.
+
+    `planned` is called after each plan.
+    """
     i = AXES.index(axis)
 
     def lasts(times: float) -> float:
         raised = getattr(limits, kind).copy()
         raised[i] *= times
-        return T * sum(map(len, plan(blocks, replace(limits, **{kind: raised}), T, start=np.zeros(6))))
+        samples = sum(map(len, plan(blocks, replace(limits, **{kind: raised}), T, start=np.zeros(6))))
+        planned()
+        return T * samples
 
     goal = lasts(1.0) - SAVED
     if lasts(MOST_TIMES) > goal:
@@ -199,13 +209,26 @@ def _saving(row: dict[str, Any]) -> str:
     return "no more of it saves a second" if more is None else f"a second less takes {more:.4g} {row['unit']}"
 
 
-def explained(blocks: Sequence[Any], limits: Limits, T: float, looked_for: int = ASKED) -> Explained:
+def explained(
+    blocks: Sequence[Any],
+    limits: Limits,
+    T: float,
+    looked_for: int = ASKED,
+    progress: Progress = lambda done, of: None,
+) -> Explained:
     """What holds the motion of blocks of segments back, as `plan` takes them.
 
     Of the limits that do so for longest, `looked_for` at most, what each would have to be to save a second, up to the
-    first that can; each takes some ten plans.
+    first that can; each takes some ten plans. `progress` gets how many plans are made, and how many there are at most.
     """
+    most = 1 + 2 * max(looked_for - 1, 0) + _PLANS * min(looked_for, 1)
+    done = count(1)
+
+    def planned() -> None:
+        progress(next(done), most)
+
     found = limiting(blocks, limits, T)
+    planned()
     rows: list[dict[str, Any]] = []
     left = looked_for
     for cause, seconds in found.seconds.items():
@@ -213,7 +236,7 @@ def explained(blocks: Sequence[Any], limits: Limits, T: float, looked_for: int =
         kind, _, axis = cause.partition(" of ")
         if kind in KINDS and left:
             now = float(getattr(limits, kind)[AXES.index(axis)])
-            times = to_save(blocks, limits, T, kind, axis)
+            times = to_save(blocks, limits, T, kind, axis, planned)
             left = left - 1 if times is None else 0
             row |= {
                 "limit": now,

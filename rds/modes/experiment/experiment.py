@@ -12,6 +12,7 @@ from typing import Any
 from rds.core.errors import ContractError, InputError, MachineError, RdsError
 from rds.core.folder_kept import folder_kept
 from rds.core.last_made import LastMade
+from rds.core.progress import Progress
 from rds.core.toml_table import TomlTable
 from rds.core.types import Ending
 from rds.machines import Machine, load_machine
@@ -25,7 +26,7 @@ from rds.modes.experiment.validation import validated
 from rds.modes.loop.changes import FILE as CHANGES
 from rds.modes.loop.changes import as_text
 from rds.modes.loop.plan import Plan
-from rds.modes.process.host import FailedSimulation, Progress, Rows, run_plan
+from rds.modes.process.host import FailedSimulation, Rows, run_plan
 from rds.modes.process.live import Live
 from rds.modes.process.record import write_whole
 from rds.results import Result

@@ -8,12 +8,12 @@ from typing import Any
 
 from rds.core import drawing
 from rds.core.atomic import write_whole
+from rds.core.progress import Progress
 from rds.core.types import Ending, Verdict
 from rds.modes.experiment.experiment import Experiment
 from rds.modes.experiment.experiment_file import PATHS
 from rds.modes.experiment.folder import new_folder
 from rds.modes.loop.program import InterpolatedProgram, Program
-from rds.modes.process.host import Progress
 from rds.results import Result
 from rds.results.files import saved_files
 from rds.results.report import DRAWN_BY, Pictures, write_report

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.progress import Progress
 from rds.modes.loop.changes import Change, timed
 from rds.modes.loop.live_values import Channel
 from rds.modes.loop.plan import Plan
-from rds.modes.process.host import Progress
 from rds.modes.process.live import Live
 from rds.modes.process.record import table
 from rds.results import Result

@@ -12,7 +12,7 @@ import sys
 import tempfile
 import time
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
@@ -24,6 +24,7 @@ from rds.core.blame import STUDENT_ERRORS
 from rds.core.errors import ContractError, InputError
 from rds.core.interrupt import Endless, interruptible, limited
 from rds.core.private_files import make_folder
+from rds.core.progress import Progress
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.loop.changes import Change, read_changes, timed
@@ -38,8 +39,6 @@ from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, claim, read_e
 from rds.modes.process.recorder import PLAN, Recorder, finish, patience
 from rds.modes.process.ring import Ring
 from rds.modes.process.shared import folders, remove_left
-
-Progress = Callable[[int, int], None]  # samples taken, samples in all
 
 _CHUNK = 5000  # samples between two calls of a simulation's progress
 _RING_BYTES = 64 << 20

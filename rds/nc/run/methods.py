@@ -6,7 +6,7 @@ method leads the simulated axes of a machine in the loop, under one controller.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rds.core.errors import ContractError, InputError
+from rds.core.progress import Progress
 from rds.interpolators import LIBRARY
 from rds.interpolators.segment_rows import read_segments
 from rds.machines import Machine, load_machine
@@ -30,7 +31,6 @@ from rds.results.reports.content import Report, Table
 if TYPE_CHECKING:
     from rds.core.figure import Picture
 
-Progress = Callable[[int, int], None]
 KIND = "interpolators"
 COLUMNS = (
     "interpolator",

@@ -27,11 +27,12 @@ from rds.bus.modules.oacs.pid import Tuning
 from rds.bus.modules.oacs.several import BusPort, Port, Several, VirtualPort
 from rds.bus.tools.link import BUILTIN, open_bus
 from rds.core.errors import InputError, MachineError
+from rds.core.progress import Progress
 from rds.interpolators.motion.segments import AXES, JOINTS, LINE
 from rds.machines import Machine
 from rds.modes import EMULATION, SIMULATION, mode_names
 from rds.nc.path_block import Event, PathBlock
-from rds.nc.run.prepare import Progress, compiled_form
+from rds.nc.run.prepare import compiled_form
 from rds.nc.setup import Setup
 from rds.results.reports.content import Report, Table
 

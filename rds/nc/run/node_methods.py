@@ -14,11 +14,11 @@ from typing import Any
 
 from rds.bus.hub.bus_settings import DEFAULT_BAUD
 from rds.core.errors import InputError
+from rds.core.progress import Progress
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.machines import Machine
 from rds.modes import EMULATION, SIMULATION, load_mode
 from rds.nc.run import can_methods, module_moves, serial_methods
-from rds.nc.run.prepare import Progress
 from rds.nc.run.serial_methods import THESIS, MethodRun, check_method
 from rds.nc.run.serial_motion import BYTE_TIME, serial_motion
 from rds.nc.setup import Setup

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.last_made import LastMade
 from rds.core.load import StudentFile, from_function
+from rds.core.progress import Progress
 from rds.core.quantities import AnyValue, Choice, Flag, Items, Quantity, Table, Text
 from rds.core.toml_table import TomlTable
 from rds.core.types import ArcSegment, LineSegment, Segment
@@ -195,7 +196,7 @@ def of_part_program(
     setup: Setup | None,
     T: float,
     method: Method,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> InterpolatedProgram:
     """A part program whose moves `method` interpolates, rapids at the speed of the slowest axis.
 

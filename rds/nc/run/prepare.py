@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.last_made import LastMade
+from rds.core.progress import Progress
 from rds.interpolators.motion.certificate import Certificate
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import PASSING
@@ -34,8 +35,6 @@ from rds.nc.tool_centre import ToolCentre, path_of_tip
 
 SPINDLE_UNIT = "rev/min"
 MOST_SAMPLES = 20_000_000  # whose references fit into memory: five and a half hours at 1 kHz
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

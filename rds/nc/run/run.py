@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.progress import Progress
 from rds.core.quantities import Flag, Quantity, checked
 from rds.core.toml_table import TomlTable
 from rds.interpolators.motion.segments import AXES, JOINTS
@@ -24,7 +25,6 @@ from rds.modes.experiment.run import Run
 from rds.modes.loop.execution import State
 from rds.modes.loop.plan import Plan
 from rds.modes.loop.program import HOLD, HOME, OVERRIDE, RESUME, Program
-from rds.modes.process.host import Progress
 from rds.modes.process.live import Live
 from rds.nc.run.forces import program_forces
 from rds.nc.run.judge import judged

@@ -21,11 +21,12 @@ from rds.bus.modules.dcs.buffers import pulses_of
 from rds.bus.modules.dcs.commands import BYTE_TIME
 from rds.bus.modules.segments import Equations, NodeSegment, arc, line
 from rds.core.errors import InputError
+from rds.core.progress import Progress
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.segments import AXES, LINE, in_plane
 from rds.machines import Machine
 from rds.modes.loop.program import Program, dwell_samples
-from rds.nc.run.prepare import Prepared, Progress, prepare
+from rds.nc.run.prepare import Prepared, prepare
 from rds.nc.setup import Setup
 
 MOTIONS = ("plan", "constant")

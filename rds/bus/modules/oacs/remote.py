@@ -32,6 +32,7 @@ from rds.bus.modules.oacs.talk import Heard
 from rds.bus.modules.oacs.transfer import ModuleDescription, decode_description
 from rds.bus.tools.link import bus_failed
 from rds.core.errors import InputError, MachineError
+from rds.core.progress import Progress
 from rds.results import Result
 
 SETTLED = 1.0  # s without a change worth the name until a recorded step counts as settled
@@ -224,7 +225,7 @@ class Module:
         period: float = 0.01,
         timeout: float | None = None,
         settled: float = SETTLED,
-        progress: Callable[[int, int], None] = lambda done, of: None,
+        progress: Progress = lambda done, of: None,
     ) -> Result:
         """Step the set point by a distance and record the response every `period` s until the axis stands.
 
