@@ -16,8 +16,8 @@ HOSTILE = ('=HYPERLINK("http://x")', "<img src=x onerror=alert(1)>", "\u202eevil
 def score(name: str = "rms", points: float = 6.0, most: float = 10.0, **more: Any) -> CriterionScore:
     """One criterion, in the middle of its bands unless told otherwise."""
     band = Band.FULL if points == most else Band.PARTIAL if points else Band.NONE
-    given = {"value": 0.23, "unit": "mm", "sentence": f"The {name} error is 0.23 mm."} | more
-    return CriterionScore(name, f"Error {name}", points, most, band=band, **given)
+    given = {"value": 0.23, "unit": "mm", "band": band, "sentence": f"The {name} error is 0.23 mm."} | more
+    return CriterionScore(name, f"Error {name}", points, most, **given)
 
 
 def grade(student: str = "ada", status: Status = Status.OK, *scores: CriterionScore, **more: Any) -> Grade:

@@ -26,7 +26,7 @@ from rds.grading.feedback.feedback import feedback_page
 from rds.grading.feedback.feedback_plots import case_picture
 from rds.grading.feedback.histogram import histogram
 from rds.grading.feedback.plain_text import cell, one_line, plain
-from rds.grading.grade import Status
+from rds.grading.grade import Band, Status
 from rds.results import Result
 from tests.grading.grades import HOSTILE, grade, score
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
@@ -222,6 +222,12 @@ def test_the_class_page_names_what_needs_a_look_first() -> None:
     assert "12.30" in page
     # the mean leaves out whom the grader failed
     assert re.search(r"<td>total</td><td class=\"number\">13</td>", page)
+
+
+def test_the_class_page_says_which_criteria_could_not_be_measured() -> None:
+    lost = [score(name, 0.0, value=None, band=Band.REVIEW, sentence="Its run was void.") for name in ("rms", "peak")]
+    page = "".join(class_page("T", [grade("ada", Status.OK, *lost)], {}))
+    assert "Error rms: Its run was void." in page and "Error peak: Its run was void." in page
 
 
 def test_a_value_without_a_unit_has_none_on_the_class_page() -> None:

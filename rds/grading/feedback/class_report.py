@@ -74,7 +74,8 @@ def _first(grades: Sequence[Grade], links: Mapping[str, str]) -> str:
     review = [grade for grade in grades if grade.status is not Status.GRADER_ERROR and grade.for_review]
     if review:
         lines = "".join(
-            f"<li>{_name(grade.student, links)}: {escape(one_line(score.sentence, 400))}</li>"
+            f"<li>{_name(grade.student, links)}, {escape(one_line(score.title))}: "
+            f"{escape(one_line(score.sentence, 400))}</li>"
             for grade in review
             for score in grade.for_review
         )
