@@ -50,14 +50,6 @@ def test_what_is_no_pair_is_not_taken_apart(answer: str, tmp_path: Any) -> None:
         tracked(str(law)).run()
 
 
-def test_an_array_of_one_voltage_is_refused_with_the_same_remedy_by_run_and_check(tmp_path: Any) -> None:
-    law = tmp_path / "law.py"
-    law.write_text("import numpy as np\ndef control(t, r, y, state, params):\n    return np.array([1.0]), state\n")
-    with pytest.raises(ContractError, match=r"as in `float\(u.item\(\)\)`"):
-        tracked(str(law)).run()
-    assert "as in `float(u.item())`" in str(rds.check_file(law))
-
-
 @pytest.mark.parametrize("voltage", ["['1', '2']", "[True, False]", "[1j, 0]", "[1.0]", "None"])
 def test_a_coupled_law_s_voltages_are_numbers(voltage: str, tmp_path: Any) -> None:
     law = tmp_path / "law.py"

@@ -257,8 +257,7 @@ def _fault(answer: Any, t: float, axis: str, parts: int, command: tuple[str, str
     if not isinstance(answer, tuple | list) or len(answer) != parts:
         said = f"control() returned {shown(answer, 200)} at t = {t:.3f} s (axis {axis})"
         return f"{said}; it must return ({what}, next_state) with a finite {what} in {unit}"
-    of_one = ", as in `float(u.item())`" if n == 1 and isinstance(answer[0], np.ndarray) and answer[0].size == 1 else ""
     return (
         f"control() returned the {what} {shown(answer[0], 200)} at t = {t:.3f} s (axis {axis}); "
-        f"it must return ({what}, next_state) with the {what} {wanted}{of_one}"
+        f"it must return ({what}, next_state) with the {what} {wanted}"
     )
