@@ -290,6 +290,12 @@ def test_so_many_draws_are_no_worse_however_few_there_are() -> None:
                 assert no_worse >= percent / 100 > no_worse - 1 / count - 1e-12
 
 
+def test_what_few_draws_order_by_chance_is_no_cause(tmp_path: Path) -> None:
+    loop = experiment(tmp_path, X, (), controller={"name": "p", "Pgain": 30.0}, duration=0.05)
+    few, more = (" ".join(sentences(study(loop, runs, ranges={"X": {"K": (0.5, 5.0)}}))) for runs in (3, 40))
+    assert "makes it worse" not in few and "less K makes it worse" in more
+
+
 def test_unstable_draws_count_as_margins_of_zero(tmp_path: Path) -> None:
     """Half the axes are unstable; the margin that 95 % had, or more, was that of 95 % of the stable ones."""
     loop = experiment(tmp_path, X, (), controller={"name": "p", "Pgain": 30.0}, duration=0.05)

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from rds.identification.robustness.study import Study
 
 PERCENTS = (5, 50, 95, 99)
+_DRIVES = 0.3  # a rank correlation that is worth a word
+_BY_CHANCE = 2.0  # standard deviations of a rank correlation that is none, 1/√(draws - 1)
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ def sentences(study: Study) -> list[str]:
             size = "diverges" if error is None else f"has an error of up to {error:.4g} {found.unit}"
             line += f"; the worst, draw {found.worst}, {size}"
             ranked = sorted((-abs(r), name, r) for name, r in found.drivers.items() if r is not None)
-            if ranked and abs(ranked[0][2]) >= 0.3:
+            known = np.count_nonzero(~np.isnan(study.figure(study.axes.index(found.axis), "max_error")))
+            if ranked and abs(ranked[0][2]) >= max(_DRIVES, _BY_CHANCE / np.sqrt(max(known - 1, 1))):
                 _, name, r = ranked[0]
                 line += f"; {'more' if r > 0 else 'less'} {name} makes it worse (rank correlation {r:+.2f})"
         said.append(line)
