@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,8 +86,8 @@ def sentences(study: Study) -> list[str]:
             size = "diverges" if error is None else f"has an error of up to {error:.4g} {found.unit}"
             line += f"; the worst, draw {found.worst}, {size}"
             ranked = sorted((-abs(r), name, r) for name, r in found.drivers.items() if r is not None)
-            known = np.count_nonzero(~np.isnan(study.figure(study.axes.index(found.axis), "max_error")))
-            if ranked and abs(ranked[0][2]) >= max(_DRIVES, _BY_CHANCE / np.sqrt(max(known - 1, 1))):
+            known = int(np.count_nonzero(~np.isnan(study.figure(study.axes.index(found.axis), "max_error"))))
+            if ranked and abs(ranked[0][2]) >= max(_DRIVES, _BY_CHANCE / sqrt(max(known - 1, 1))):
                 _, name, r = ranked[0]
                 line += f"; {'more' if r > 0 else 'less'} {name} makes it worse (rank correlation {r:+.2f})"
         said.append(line)
