@@ -94,9 +94,11 @@ def test_errors_that_grow_again_did_not_converge() -> None:
     assert learn(experiment(), 4).notes == []
 
 
-def test_where_the_voltage_is_at_its_limit_nothing_winds_up() -> None:
+@pytest.mark.parametrize("own", [{}, {"maxoutput": 5.0}])
+def test_where_the_voltage_is_at_its_limit_nothing_winds_up(own: dict[str, float]) -> None:
     """The correction came to 200 mm in 20 trials, growing with each, for a reference of 20 mm."""
-    learned = learn(experiment(reference=SINE | {"amplitude": 20.0, "frequency": 1.0}), 3)
+    law = {"name": "p"} | own
+    learned = learn(experiment(reference=SINE | {"amplitude": 20.0, "frequency": 1.0}, controller=law), 3)
     assert np.abs(learned.correction["X"]).max() < 0.5
     assert learned.converged and "the command was at its limit in 9" in learned.notes[0]
 

@@ -179,6 +179,9 @@ def _at_limit(result: Result, axis: AxisPlan, plan: Plan) -> np.ndarray:
     low, high, _ = limits(board.range, board.bits, saturation=plan.saturation, quantization=plan.quantization)
     if axis.command.quantity != "voltage":
         low, high = -axis.most_target, axis.most_target
+    own = axis.controller.params.get("maxoutput") if axis.controller is not None else None
+    if isinstance(own, float) and own > 0.0:  # of a law of the library that limits itself
+        low, high = max(low, -own), min(high, own)
     command = _every_sample(result, f"{axis.axis.name}_command", plan)
     return np.asarray((command <= low) | (command >= high))
 
