@@ -19,7 +19,7 @@ from rds.checks.memory import judge_memory
 from rds.checks.replay import Call
 from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.timing import Work, judge_time
-from rds.checks.values import same, size
+from rds.checks.values import has_nan, same, size
 from rds.core.adapt import as_controller, is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.load import wants_state
@@ -231,6 +231,15 @@ class _Run:
         if _is_sequence(initial) and size(initial) and _is_sequence(final) and len(initial) != len(final):
             said = f"next_state has {len(final)} values and initial_state {len(initial)}"
             self.found.warn(clauses.NEXT_STATE, f"{said}; give both the same form")
+        if not has_nan(self.initial_state):
+            for (t, *_), (_, state, *_) in self.calls:
+                if has_nan(state):
+                    return self.found.warn(
+                        clauses.NEXT_STATE,
+                        f"next_state is {shown(state)} at t = {t:.3f} s: a number has become NaN, and a voltage that "
+                        "is finite all the same (min() and max() turn NaN into a limit) lets the run go on with it; "
+                        "look for a division by zero, a root, a logarithm or inf - inf",
+                    )
 
     def _probe(self) -> None:
         """Ordinary moments that the run may not have had: all zero, at rest far from the reference."""

@@ -16,12 +16,14 @@ def learn(
     trials: Annotated[int, typer.Option("--trials", "-n", help="How often it runs, the first time uncorrected.")] = 10,
     mode: Annotated[str | None, typer.Option("--mode", "-m", help="Instead of the experiment's own.")] = None,
     gain: Annotated[float, typer.Option(help="Part of the error that a trial adds to the correction.")] = 0.5,
-    lead: Annotated[float, typer.Option(help="Time by which the error is taken earlier, s.")] = 0.002,
+    lead: Annotated[
+        float | None, typer.Option(help="Time by which the error is taken earlier, s; by default two samples.")
+    ] = None,
     cutoff: Annotated[float, typer.Option(help="Frequency at which half is still learnt, Hz.")] = 10.0,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the last trial and a picture.")] = None,
     json: Json = False,
 ) -> None:
-    """Iterative learning control: the RMS error of each trial. The exit code is 1 if the last one is worse."""
+    """Iterative learning control: the RMS error of each trial. The exit code is 1 if the errors grow."""
     with refusals(), stdout_kept(json):
         from rds.modes.experiment import Experiment
         from rds.modes.experiment.learning import learn as learn_trials
@@ -38,7 +40,8 @@ def learn(
 
             files = save_all(last, out) | {"trials": _draw(rms, last.units, out / "trials.png")}
     if json:
-        print_json({"rms": rms, "converged": learned.converged, "files": {k: str(v) for k, v in files.items()}})
+        told = {"rms": rms, "converged": learned.converged, "notes": learned.notes}
+        print_json(told | {"files": {k: str(v) for k, v in files.items()}})
     else:
         from rds.cli.console import show_table
 
@@ -48,6 +51,8 @@ def learn(
         ]
         titles = ["trial", *(f"{axis} RMS error [{last.units[f'{axis}_measured']}]" for axis in rms)]
         show_table(f"Learning, {last.meta['mode']}", titles, rows)
+        for note in learned.notes:
+            typer.echo(note)
         for kind in ("trials", "csv"):
             if kind in files:
                 typer.echo(f"{kind}: {files[kind]}")

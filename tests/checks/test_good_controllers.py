@@ -272,6 +272,18 @@ def test_a_counter_that_decides_nothing_is_only_worth_a_warning():
     assert "variable `calls` around control()" in str(report.warnings[0])
 
 
+def test_a_state_that_becomes_nan_behind_a_limit_is_worth_a_warning():
+    """min() and max() turn it into -10 V; a state that begins with NaN, as what is not known yet, is no accident."""
+
+    def control(t, r, y, state, params):
+        total = state[0] + r.position - y if t < 0.2 else math.nan
+        return min(10.0, max(-10.0, GAIN * (r.position - y) + total)), [total]
+
+    report = check_controller(control, initial_state=[0.0])
+    assert report.ok and "next_state is [nan] at t = 0.200 s: a number has become NaN" in str(report.warnings[0])
+    assert not check_controller(lambda t, r, y, state, params: (0.0, [math.nan]), initial_state=[math.nan]).warnings
+
+
 def test_a_user_may_check_with_an_exact_period_of_another_size():
     report = check_controller(proportional, 0.01)
     assert report.ok

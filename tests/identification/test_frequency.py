@@ -132,6 +132,23 @@ def test_the_bands_hold_their_share_of_lines() -> None:
         assert least < np.mean(inside) < 0.995
 
 
+def test_the_bands_hold_rounding_that_repeats_with_the_command() -> None:
+    """Of an axis without noise every period is rounded alike: no band at all, and said not to be of first order."""
+    held, values = [], {"tau": 0.0123, "K": 2.31, "friction_plus": 0.0, "friction_minus": 0.0}
+    t = np.arange(4000) * 1e-3
+    for amplitude in (1.0, 3.0, 7.3):  # V
+        u = multisine(amplitude, 1.0, 1.0, 80.0).value(t)
+        exact = structure("axis").respond(t, u, [0.0, 0.0], values)
+        log = Log("rounded", t, u, np.round(exact, 3), resolution=1e-3)
+        found = frequency_response(log)
+        off = found.response - model_response(found.frequency, 1e-3, values, False)
+        held += [np.abs(part) < 1.96 * found.std_error for part in (off.real, off.imag)]
+        assert not any(
+            "standard errors off" in warning for warning in fit([log], structure("axis"), "frequency").warnings
+        )
+    assert np.mean(held) == pytest.approx(0.95, abs=0.04)
+
+
 def test_periods_are_found_where_there_are_any() -> None:
     assert find_period(sample_voltage(BOTH_WAYS, T, 9000)) == 2000
     assert find_period(sample_voltage(square(1.0, 4.0), T, 3000)) == 250

@@ -167,6 +167,20 @@ def test_beyond_the_limit_the_first_sample_is_named(tmp_path: Path, at: int) -> 
     assert len(read(tmp_path, made, "jitter_limit = 0.2\n")) == 4000
 
 
+@pytest.mark.parametrize(("late", "said"), [([0.8e-3], "80 %"), ([2.0e-3, 1.1e-3, 0.2e-3], "200 %")])
+def test_samples_that_came_late_are_not_missing(tmp_path: Path, late: list[float], said: str) -> None:
+    """They were told as a gap, and as samples in which the command was to be taken as held."""
+    made = axis()
+    made["time"][1000 : 1000 + len(late)] += late
+    with pytest.raises(
+        InputError, match=rf"\({said} of the period\) off; beyond the limit of 10 % first at sample 1000 "
+    ):
+        read(tmp_path, made)
+    made = {name: np.delete(values, slice(2000, 2010)) for name, values in made.items()}
+    with pytest.raises(InputError, match="1 gap, 10 samples missing; the first before sample 2000"):
+        read(tmp_path, made)
+
+
 def test_gaps_duplicates_and_blanks(tmp_path: Path) -> None:
     made = {name: np.delete(values, slice(1000, 1010)) for name, values in axis().items()}
     with pytest.raises(InputError, match="1 gap, 10 samples missing; the first before sample 1000"):

@@ -79,6 +79,8 @@ def test_a_model_that_repeats_the_last_measurement_is_not_valid_however_good_one
     assert a.ahead[1].rmse > a.naive[1].rmse
     assert found.verdict.word is Word.NOT
     assert {"free-run", "free-run-velocity", "ahead"} <= kinds(found, "against")
+    (said,) = [reason.what for reason in found.verdict.reasons if reason.kind == "ahead"]
+    assert "1, 10, 100 ahead, the model is worse than none, whatever its fit" in said
     assert found.exit_code == 1
 
 

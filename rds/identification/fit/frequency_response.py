@@ -4,9 +4,11 @@ The output is the mean velocity over each sample (a spindle's speed at it), so t
 held over that same sample.
 
 A command that repeats is averaged over its periods, whole ones, the first left out: then nothing leaks from one
-frequency into another, what is not repeated is noise, and its size is seen. Any other command (a chirp) goes by Welch's
-method: H₁ = S_uy / S_uu over Hann windows that overlap by half. The coherence γ² = |S_uy|²/(S_uu S_yy) is the share of
-the output's power that follows the command linearly; from n averages H has the variance |H|² (1 - γ²) / (γ² n).
+frequency into another, what is not repeated is noise, and its size is seen. The encoder's rounding may repeat, too:
+what the noise that is seen lacks of its variance q²/12 is added, and not averaged. Any other command (a chirp) goes by
+Welch's method: H₁ = S_uy / S_uu over Hann windows that overlap by half. The coherence γ² = |S_uy|²/(S_uu S_yy) is the
+share of the output's power that follows the command linearly; from n averages H has the variance
+|H|² (1 - γ²) / (γ² n). What the windows themselves distort is not in it (`window_distortion`).
 """
 
 from __future__ import annotations
@@ -89,7 +91,7 @@ def frequency_response(log: Log, is_rate: bool | None = None, period: float | No
         raise InputError("the output never changes: there is no response; log a motion of the axis", log.name)
     length = _given_period(log, period, len(u)) if period is not None else find_period(u)
     if length is not None:
-        return _averaged(u, y, length, T)
+        return _averaged(u, y, length, T, log.resolution or 0.0, len(y) == len(log))
     return _welch(u, y, T)
 
 
@@ -136,7 +138,9 @@ def _given_period(log: Log, period: float, samples: int) -> int:
     return round(length)
 
 
-def _averaged(u: np.ndarray, y: np.ndarray, length: int, T: float) -> FrequencyResponse:
+def _averaged(
+    u: np.ndarray, y: np.ndarray, length: int, T: float, resolution: float, is_rate: bool
+) -> FrequencyResponse:
     periods = len(u) // length
     skip = 1 if periods >= 3 else 0
     shape = (periods - skip, length)
@@ -155,8 +159,10 @@ def _averaged(u: np.ndarray, y: np.ndarray, length: int, T: float) -> FrequencyR
     count = periods - skip
     H = Y[:, excited].mean(axis=0) / U[:, excited].mean(axis=0)
     noise = Y[:, excited] - H * U[:, excited]
-    power = (np.abs(noise) ** 2).sum(axis=0) / max(count - 1, 1)
-    variance = _smooth(power) / (count * size[excited] ** 2)
+    power = _smooth((np.abs(noise) ** 2).sum(axis=0) / max(count - 1, 1))
+    slope = 1.0 if is_rate else 2.0 * np.sin(np.pi * frequency[excited] * T) / T  # of a position, to its difference
+    rounded = length * resolution**2 / 12.0 * slope**2
+    variance = (power / count + np.maximum(rounded - power, 0.0)) / size[excited] ** 2
     total = (np.abs(Y[:, excited]) ** 2).mean(axis=0)
     coherence = np.abs((Y[:, excited] * U[:, excited].conj()).mean(axis=0)) ** 2 / (
         total * (np.abs(U[:, excited]) ** 2).mean(axis=0)

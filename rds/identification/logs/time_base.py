@@ -64,7 +64,7 @@ def time_base(time: np.ndarray, jitter_limit: float, duplicates: str, gaps: str,
         findings.append(Finding("duplicate", f"{what}; dropped", Gravity.WARNING, k))
     period = float(np.median(steps))
     stretches = [(0, len(keep))]
-    wide = np.flatnonzero(steps > _GAP * period)
+    wide = _with_missing(time[keep], np.flatnonzero(steps > _GAP * period), period)
     if len(wide):
         findings.append(_gaps(time[keep], steps, wide, period, gaps, where))
     if len(wide) and gaps == "split":
@@ -73,6 +73,16 @@ def time_base(time: np.ndarray, jitter_limit: float, duplicates: str, gaps: str,
     steps = np.delete(steps, wide)
     findings += _jitter(time[keep], steps, wide, period, jitter_limit, where)
     return TimeBase(keep, tuple(stretches), period, tuple(findings))
+
+
+def _with_missing(time: np.ndarray, wide: np.ndarray, period: float) -> np.ndarray:
+    """The long steps in which samples are missing: not those after which late ones come until all are there."""
+    lacking = np.minimum(np.rint((time[wide + 1] - time[wide]) / period) - 1.0, len(time)).astype(np.int64)
+    after = wide + 1 + lacking  # where the log would be, had they only come late
+    inside = after < len(time)
+    made_up = np.zeros(len(wide), bool)
+    made_up[inside] = time[after[inside]] - time[wide[inside]] < (lacking[inside] + _GAP) * period
+    return wide[~made_up]
 
 
 def _gaps(time: np.ndarray, steps: np.ndarray, wide: np.ndarray, period: float, gaps: str, where: str) -> Finding:

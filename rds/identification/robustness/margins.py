@@ -16,12 +16,16 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.core.linear_law import Law, linear_law
 from rds.core.types import Controller, Model
 from rds.models.machine_model import MachineAxisMotion, linear_part, split_delay
 
-GRID = 800  # frequencies, logarithmic up to Nyquist's
-_DECADES = 5.0
+_GRID = 1440  # frequencies, logarithmic up to Nyquist's
+_DECADES = 9.0  # of them: an axis of seconds that is sampled every 50 µs crosses 1 at a millionth of Nyquist's
+_PER_WAIT = 40  # frequencies, evenly spaced, for each sample of delay, which turns the loop by half a lap
+_STEP = 16  # samples: loops whose delays are that near share their frequencies
+_AT_ONCE = 720_000  # points of loops
 _REAL = 1e-6  # imaginary part of a loop at Nyquist's frequency, where rounding alone leaves one
 _LARGEST_DELAY = 200  # samples: beyond, no poles are computed
 
@@ -45,13 +49,24 @@ def loop_margins(law: Law, models: Sequence[Model], T: float) -> np.ndarray:
         return rows
     axes = np.array([parts[k] for k in known])  # tau, K, whole, rest
     rows[known, 3] = _pole_radius(law, axes, T)
-    w = np.pi / T * np.logspace(-_DECADES, 0.0, GRID)
-    for begin in range(0, len(known), 500):
-        some = slice(begin, begin + 500)
-        stable = rows[known[some], 3] < 1.0
-        found = margins_of(w, _loop(law, axes[some], w, T))
-        rows[known[some], :3] = np.where(stable[:, None], found, np.nan)
+    waits = _STEP * np.ceil((axes[:, 2] + len(law.G)) / _STEP)  # each loop by itself, whatever the others' delays
+    for wait in np.unique(waits):
+        w = grid(T, int(wait))
+        alike = np.flatnonzero(waits == wait)
+        loops = max(_AT_ONCE // len(w), 1)
+        for begin in range(0, len(alike), loops):
+            some = alike[begin : begin + loops]
+            at = np.array(known)[some]
+            found = margins_of(w, _loop(law, axes[some], w, T))
+            rows[at, :3] = np.where(rows[at, 3:] < 1.0, found, np.nan)
     return rows
+
+
+def grid(T: float, waits: int) -> np.ndarray:
+    """Frequencies (rad/s) at which margins are looked for, in a loop in which values wait for `waits` samples."""
+    even = np.linspace(0.0, 1.0, _PER_WAIT * min(waits, 2 * _LARGEST_DELAY) + 1)[1:]
+    found: np.ndarray = np.pi / T * np.union1d(np.logspace(-_DECADES, 0.0, _GRID), even)
+    return found
 
 
 def open_loop(law: Law, model: Model, T: float, w: np.ndarray) -> np.ndarray:
@@ -113,9 +128,23 @@ def _loop(law: Law, axes: np.ndarray, w: np.ndarray, T: float) -> np.ndarray:
     inputs = now + before / z  # (2, axes, frequencies)
     speed = inputs[1] / (z - a22)
     plant = (inputs[0] + a12 * speed) / (z - 1.0) * z ** -axes[:, 2:3]
-    n = len(law.G)
-    solved = np.linalg.solve(z[:, None, None] * np.eye(n) - law.F, np.tile(law.G, (len(z), 1, 1)))[..., 0]
-    return -(solved @ law.H[0] + law.D) * plant
+    return -law_response(law, z) * plant
+
+
+def law_response(law: Law, z: np.ndarray) -> np.ndarray:
+    """u/y of a law at points of the z-plane, complex: H (z - F)⁻¹ G + D, by F's triangular form."""
+    if not len(law.G):
+        return np.full(len(z), law.D, dtype=complex)
+    with needed_for("margins"):
+        from scipy.linalg import schur
+
+    triangle, turned = schur(law.F, output="complex")
+    right = turned.conj().T @ law.G[:, 0]
+    solved = np.zeros((len(right), len(z)), dtype=complex)
+    for row in reversed(range(len(right))):
+        solved[row] = (right[row] + triangle[row, row + 1 :] @ solved[row + 1 :]) / (z - triangle[row, row])
+    found: np.ndarray = law.H[0] @ turned @ solved + law.D
+    return found
 
 
 def margins_of(w: np.ndarray, loop: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from rds.controllers.relay import NAME, SIGNALS, Tuned, tuned
 from rds.core.errors import InputError
 from rds.core.linear_law import linear_law
 from rds.core.toml_text import toml_text
-from rds.identification.robustness.margins import GRID, margins_of
+from rds.identification.robustness.margins import grid, law_response, margins_of
 from rds.models.machine_model import linear_part
 from rds.modes import load_mode
 from rds.results import Result, open_result
@@ -118,13 +118,11 @@ def model_margins(found: Tuned, model: Mapping[str, Any], T: float, delay: int) 
     late = delay + int(np.ceil(float(linear.get("delay", 0.0)) / T - 1e-9))
     if _radius(A, B, law, late) >= 1.0:
         return np.nan, np.nan
-    w = np.pi / T * np.logspace(-5.0, 0.0, GRID)
+    w = grid(T, late + len(law.G))
     z = np.exp(1j * w * T)
-    plant = (
-        np.linalg.solve(z[:, None, None] * np.eye(len(A)) - A, np.tile(B[:, None], (GRID, 1, 1)))[:, 0, 0] * z**-late
-    )
-    of_law = np.linalg.solve(z[:, None, None] * np.eye(len(law.G)) - law.F, np.tile(law.G, (GRID, 1, 1)))[..., 0]
-    row = margins_of(w, -((of_law @ law.H[0] + law.D) * plant)[None])[0]
+    inverted = np.linalg.solve(z[:, None, None] * np.eye(len(A)) - A, np.tile(B[:, None], (len(z), 1, 1)))
+    loop = -law_response(law, z) * inverted[:, 0, 0] * z**-late
+    row = margins_of(w, loop[None])[0]
     return float(row[1]), float(row[0])
 
 

@@ -43,7 +43,10 @@ def write_study(study: Study, folder: Path, title: str) -> dict[str, Path]:
     return files
 
 
-FIGURES_NOTE = "Under 95 %: 95 % of the draws are no worse than this; a margin is worse when it is smaller."
+FIGURES_NOTE = (
+    "Under 95 %: 95 % of the draws are no worse than this; a margin is worse when it is smaller. An unstable loop has "
+    "margins of 0."
+)
 
 
 def figure_rows(found: AxisSummary) -> list[list[float | str | None]]:

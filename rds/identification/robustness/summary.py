@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rds.core.extras import needed_for
-from rds.identification.robustness.figures import FIGURES
+from rds.identification.robustness.figures import FIGURES, MARGINS
 
 if TYPE_CHECKING:
     from rds.identification.robustness.study import Study
 
 PERCENTS = (5, 50, 95, 99)
+_DRIVES = 0.3  # a rank correlation that is worth a word
+_BY_CHANCE = 2.0  # standard deviations of a rank correlation that is none, 1/√(draws - 1)
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,8 @@ def sentences(study: Study) -> list[str]:
             size = "diverges" if error is None else f"has an error of up to {error:.4g} {found.unit}"
             line += f"; the worst, draw {found.worst}, {size}"
             ranked = sorted((-abs(r), name, r) for name, r in found.drivers.items() if r is not None)
-            if ranked and abs(ranked[0][2]) >= 0.3:
+            known = int(np.count_nonzero(~np.isnan(study.figure(study.axes.index(found.axis), "max_error"))))
+            if ranked and abs(ranked[0][2]) >= max(_DRIVES, _BY_CHANCE / sqrt(max(known - 1, 1))):
                 _, name, r = ranked[0]
                 line += f"; {'more' if r > 0 else 'less'} {name} makes it worse (rank correlation {r:+.2f})"
         said.append(line)
@@ -113,7 +117,7 @@ def _axis(study: Study, number: int) -> AxisSummary:
         axis=axis.name,
         unit=plan.axis.unit,
         figures={
-            name: _percentiles(study.figure(number, name), float(study.nominal[number, i]), worse_is_more)
+            name: _percentiles(_without_nan(study, number, i), worse_is_more)
             for i, (name, (_, _, worse_is_more)) in enumerate(FIGURES.items())
         },
         units={name: unit or plan.axis.unit for name, (_, unit, _) in FIGURES.items()},
@@ -132,13 +136,23 @@ def _axis(study: Study, number: int) -> AxisSummary:
     )
 
 
-def _percentiles(values: np.ndarray, nominal: float, worse_is_more: bool) -> dict[str, float | None]:
-    known = values[~np.isnan(values)]
+def _without_nan(study: Study, number: int, figure: int) -> np.ndarray:
+    """A figure of the nominal run and of every draw; a loop that is unstable has margins of 0."""
+    rows = np.concatenate([study.nominal[None, number], study.figures[:, number]])
+    values, radius = rows[:, figure], rows[:, list(FIGURES).index("pole_radius")]
+    is_margin = list(FIGURES)[figure] in MARGINS
+    return np.where(np.isnan(values) & (radius >= 1.0), 0.0, values) if is_margin else values
+
+
+def _percentiles(values: np.ndarray, worse_is_more: bool) -> dict[str, float | None]:
+    """Of the values of the draws; the first one is the nominal run's."""
+    nominal, known = float(values[0]), values[1:][~np.isnan(values[1:])]
     if not len(known):
         return {"nominal": _finite(nominal), **{f"p{p}": None for p in PERCENTS}, "worst": None}
-    # by order statistics, so that an infinite error does not make its neighbours NaN; of margins, less is worse
-    percents = [p if worse_is_more else 100 - p for p in PERCENTS]
-    found = np.percentile(known, percents, method="nearest")
+    # the least value that so many draws, or more, are no worse than: one of them, so that an infinite error does not
+    # make its neighbours NaN; of margins, less is worse
+    sign = 1.0 if worse_is_more else -1.0
+    found = sign * np.percentile(sign * known, PERCENTS, method="inverted_cdf")
     worst = known.max() if worse_is_more else known.min()
     return {
         "nominal": _finite(nominal),

@@ -198,10 +198,15 @@ def _ahead(a: Assessment, bands: Bands) -> Iterator[Reason]:
     said = ", ".join(
         f"{k}: {e.rmse:.3g} ({a.naive[k].rmse:.3g} without a model)" for k, e in a.ahead.items() if k in a.naive
     )
-    unskilled = [str(k) for k in a.ahead if k not in skilled]
+    worse = [k for k in a.ahead if k in a.naive and a.ahead[k].rmse > a.naive[k].rmse]
+    little = [k for k in a.ahead if k not in skilled and k not in worse]
     text = f"RMSE of predictions so many samples ahead, {a.unit}: {said}"
-    if unskilled:
-        text += f"; {', '.join(unskilled)} ahead, the model is worth little more than none, whatever its fit"
+    for which, of_it in (
+        (little, f"the error is {bands.skill:g} times that without a model, or more"),
+        (worse, "the model is worse than none"),
+    ):
+        if which:
+            text += f"; {', '.join(map(str, which))} ahead, {of_it}, whatever its fit"
     noisy = all(of_noise(a, e) for e in a.ahead.values())
     yield Reason(Side.NOTE if skilled or noisy else Side.AGAINST, "ahead", text)
 

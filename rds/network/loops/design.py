@@ -71,13 +71,13 @@ class Designed:
     def __str__(self) -> str:
         position, velocity = self.controller.params["gains"]
         least, most = self.spread
-        margin = "more than 60 samples" if self.margins.delay == inf else f"{self.margins.delay * 1e3:.4g} ms"
+        margin = "of 60 samples, and more" if self.margins.delay == inf else f"below {self.margins.delay * 1e3:.4g} ms"
         said = "surely stays stable" if self.bears else "is not surely stable (the bound is sufficient, not necessary)"
         return "\n".join(
             [
                 f"axis {self.axis}, sampled every {self.T * 1e3:g} ms, delay {self.options['delay'] * 1e6:.0f} µs",
                 f"gains {position:.5g} V/mm and {velocity:.5g} V/(mm/s)",
-                f"delay margin: stable with constant delays below {margin}",
+                f"delay margin: stable with constant delays {margin}",
                 f"jitter margin at {least * 1e6:.0f} µs: {self.margins.jitter(least) * 1e6:.0f} µs",
                 f"with delays from {least * 1e6:.0f} to {most * 1e6:.0f} µs the loop {said}",
             ]
