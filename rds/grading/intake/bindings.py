@@ -91,6 +91,26 @@ def used_within(function: ast.AST) -> set[str]:
     return found
 
 
+def table_of(statement: ast.stmt) -> symtable.SymbolTable:
+    """The names of a statement, with its comprehensions as generators: from Python 3.12 on the variables of all others
+    count as the notebook's own.
+    """
+    text = ast.unparse(statement)
+    if any(isinstance(node, ast.ListComp | ast.SetComp | ast.DictComp) for node in ast.walk(statement)):
+        text = ast.unparse(_Generators().visit(ast.parse(text)))
+    return symtable.symtable(text, "notebook", "exec")
+
+
+class _Generators(ast.NodeTransformer):
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        super().generic_visit(node)
+        if isinstance(node, ast.ListComp | ast.SetComp):
+            return ast.GeneratorExp(node.elt, node.generators)
+        if isinstance(node, ast.DictComp):
+            return ast.GeneratorExp(ast.Tuple([node.key, node.value], ast.Load()), node.generators)
+        return node
+
+
 def stored(target: ast.AST) -> Iterator[str]:
     """The names that a target binds, without those whose parts it sets."""
     yield from (e.id for e in ast.walk(target) if isinstance(e, ast.Name) and isinstance(e.ctx, ast.Store))

@@ -9,7 +9,6 @@ those that a function of the notebook changes when it calls it (`def tune(): par
 from __future__ import annotations
 
 import ast
-import symtable
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import chain
@@ -27,6 +26,7 @@ from rds.grading.intake.bindings import (
     reads_file,
     root,
     stored,
+    table_of,
 )
 from rds.grading.intake.overwritten import SetAgain
 
@@ -375,7 +375,7 @@ def _made_and_used(
     absent: Set[str],
 ) -> tuple[set[str], set[str]]:
     """The names that a statement binds or changes, and those of the notebook that it needs, in functions too."""
-    top = symtable.symtable(ast.unparse(statement), "notebook", "exec")
+    top = table_of(statement)
     made = {symbol.get_name() for symbol in top.get_symbols() if symbol.is_assigned() or symbol.is_imported()}
     used = {symbol.get_name() for symbol in top.get_symbols() if symbol.is_referenced()}
     used |= {root(node.target) for node in ast.walk(statement) if isinstance(node, ast.AugAssign)} - {""}
