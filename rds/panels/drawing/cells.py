@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
-_STATIC = Path(__file__).parent / "static"
-
-
-@cache
-def _static(ending: str) -> str:
-    return (_STATIC / f"cells.{ending}").read_text(encoding="utf-8")
+from rds.panels.kit.static_files import static
 
 
 class Cells(anywidget.AnyWidget):
@@ -26,7 +19,7 @@ class Cells(anywidget.AnyWidget):
     rings: Any = traitlets.List([]).tag(sync=True)
 
     def __init__(self, text: str):
-        super().__init__(_esm=_static("js"), _css=_static("css"), text=text)
+        super().__init__(_esm=static(__file__, "cells.js"), _css=static(__file__, "cells.css"), text=text)
 
     def outline(self, rings: list[list[list[float]]]) -> None:
         """Show these, which are of the cells as they are."""

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
-
 import anywidget
 import traitlets
 
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "keys.js").read_text(encoding="utf-8")
+from rds.panels.kit.static_files import static
 
 
 class Keys(anywidget.AnyWidget):
@@ -20,4 +14,4 @@ class Keys(anywidget.AnyWidget):
     _esm = traitlets.Unicode().tag(sync=True)
 
     def __init__(self) -> None:
-        super().__init__(_esm=_module())
+        super().__init__(_esm=static(__file__, "keys.js"))

@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
-_STATIC = Path(__file__).parent / "static"
-
-
-@cache
-def _static(ending: str) -> str:
-    return (_STATIC / f"rescue.{ending}").read_text(encoding="utf-8")
+from rds.panels.kit.static_files import static
 
 
 class Rescue(anywidget.AnyWidget):
@@ -29,7 +22,7 @@ class Rescue(anywidget.AnyWidget):
     channels: Any = traitlets.List([]).tag(sync=True)
 
     def __init__(self) -> None:
-        super().__init__(_esm=_static("js"), _css=_static("css"))
+        super().__init__(_esm=static(__file__, "rescue.js"), _css=static(__file__, "rescue.css"))
         self.on_msg(self._asked)
 
     def _asked(self, _: Any, content: Any, __: Any) -> None:

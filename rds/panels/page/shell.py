@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from functools import cache
 from html import escape
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -16,6 +14,7 @@ from rds.core.errors import RdsError
 from rds.panels.kit.button import button, order
 from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
+from rds.panels.kit.static_files import static
 from rds.panels.kit.ticker import Ticker
 from rds.panels.page.colours import Colours
 from rds.panels.page.emergency import emergency_stop
@@ -26,13 +25,6 @@ from rds.panels.page.rescue import Rescue
 from rds.panels.page.still_here import StillHere
 from rds.panels.registry import PANELS
 from rds.panels.session.session import Message, Session
-
-_STYLE = Path(__file__).parent / "static" / "style.css"
-
-
-@cache
-def _style() -> str:
-    return f"<style>{_STYLE.read_text(encoding='utf-8')}</style>"
 
 
 class Shell:
@@ -66,7 +58,8 @@ class Shell:
         self.presence = Presence(self._shown, lambda sentence: self.say(sentence, "warning"))
         self.language = Language(session)
         self.still_here = StillHere()  # for what must not go on when the last browser has gone
-        unseen = [self.presence, self.still_here, self.colours, self.language, Keys(), Html(_style())]
+        style = Html(f"<style>{static(__file__, 'style.css')}</style>")
+        unseen = [self.presence, self.still_here, self.colours, self.language, Keys(), style]
         self.widget = widgets.VBox([*unseen, self._corner(), self._head(), self._notice, body, self._rescue])
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "override.js").read_text(encoding="utf-8")
+from rds.panels.kit.static_files import static
 
 
 class OverrideSlider(anywidget.AnyWidget):
@@ -30,7 +25,7 @@ class OverrideSlider(anywidget.AnyWidget):
     tip = traitlets.Unicode("").tag(sync=True)
 
     def __init__(self, on_word: Callable[[float, bool], None], **options: Any):
-        super().__init__(_esm=_module(), **options)
+        super().__init__(_esm=static(__file__, "override.js"), **options)
         self._on_word = on_word
         self.on_msg(self._told)
 
