@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json as json_text
 from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
@@ -262,13 +261,9 @@ def _save(done: Interpolation, out: Path | None, plot: bool) -> list[Path]:
         from rds.interpolators.plots import pictures
 
         drawn = {folder / f"{name}.png": picture.png() for name, picture in pictures(done).items()}
-        write_files({path: partial(_write, png) for path, png in drawn.items()})
+        write_files(drawn)
         files += drawn
     return files
-
-
-def _write(data: bytes, stream: BinaryIO) -> None:
-    stream.write(data)
 
 
 def _show(done: Interpolation, notes: list[str], files: list[Path]) -> None:

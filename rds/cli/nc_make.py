@@ -84,13 +84,12 @@ def written(
             text = part_program(
                 made.segments, made.title, safe_height=safe, spindle=spindle, blend=blend, decimals=decimals
             ).encode()
-        writers: dict[Path, Callable[[Any], None]] = {out: lambda stream: stream.write(text)}
+        files = {out: text}
         if plot is not None:
             from rds.nc.paths.pictures import picture
 
-            image = picture(made.segments, made.said, drawing=made.drawing).png()
-            writers[plot] = lambda stream: stream.write(image)
-        write_files(writers)
+            files[plot] = picture(made.segments, made.said, drawing=made.drawing).png()
+        write_files(files)
         found: dict[str, Any] = {"file": str(out), "picture": None if plot is None else str(plot)}
         found |= {**summary(made.segments), **made.more}
     if json:
