@@ -130,9 +130,9 @@ def all_notes(result: Result) -> list[str]:
     return [*map(str, result.meta.get("notes") or []), *metric_notes(result)]
 
 
-def key_values(values: Mapping[str, Any], title: str = "") -> str:
+def key_values(values: Mapping[str, Any]) -> str:
     """A mapping as a table of two columns; nested mappings as `a.b`."""
-    return table(["", ""], [[key, value] for key, value in flat(values)], title) if values else ""
+    return table(["", ""], [[key, value] for key, value in flat(values)]) if values else ""
 
 
 def flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:

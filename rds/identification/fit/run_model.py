@@ -28,11 +28,10 @@ SPINDLE_UNIT = "rev/min"
 
 def run_model(
     file: ModelFile,
-    values: Mapping[str, float] | None = None,
     unit: str | None = None,
     per_volt: float | None = None,
 ) -> Model:
-    """The model of a model file, exact for every option of its structure, with `values` over those of the file.
+    """The model of a model file, exact for every option of its structure.
 
     `unit` is that of the axis's position, where it is known: a spindle's model is for "rev/min", one that turns for
     "deg". `per_volt` is how many units of its command the drive makes of a volt, for a model that is commanded in
@@ -42,12 +41,11 @@ def run_model(
     if not file.is_student:
         _check_unit(file, unit)
         _check_command(file, per_volt)
-    merged = file.values() | dict(values or {})
     try:
         if file.is_student:
-            model = student_model(student_structure(file), merged, SUBSTEPS)
+            model = student_model(student_structure(file), file.values(), SUBSTEPS)
         else:
-            table = library_table(checked_structure(file), merged, per_volt or 1.0)
+            table = library_table(checked_structure(file), file.values(), per_volt or 1.0)
             model = library_model(table.pop("name"), **table)
     except InputError as error:
         raise error if error.where else InputError(str(error), file.path) from error
