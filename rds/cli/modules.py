@@ -194,10 +194,7 @@ def stop(context: typer.Context, on_bus: BusOptions, json: Json = False) -> None
     """Zero volts now."""
     with _module(context, on_bus) as module:
         module.stop()
-    if json:
-        print_json({"stopped": context.obj})
-    else:
-        typer.echo("stopped")
+    print_json({"stopped": context.obj}) if json else typer.echo("stopped")
 
 
 @module_app.command()
@@ -206,10 +203,7 @@ def switch(context: typer.Context, on_bus: BusOptions, json: Json = False) -> No
     """Turn the motion under way round, from a second terminal: what is left of the way, the other way."""
     with _module(context, on_bus) as module:
         module.switch_direction()
-    if json:
-        print_json({"switched": context.obj})
-    else:
-        typer.echo("switched its direction")
+    print_json({"switched": context.obj}) if json else typer.echo("switched its direction")
 
 
 @module_app.command()
@@ -218,10 +212,7 @@ def reset(context: typer.Context, on_bus: BusOptions, json: Json = False) -> Non
     """Release the latch of the emergency stop."""
     with _module(context, on_bus) as module:
         module.reset_emergency()
-    if json:
-        print_json({"reset": context.obj})
-    else:
-        typer.echo("emergency stop reset")
+    print_json({"reset": context.obj}) if json else typer.echo("emergency stop reset")
 
 
 @module_app.command()

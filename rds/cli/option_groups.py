@@ -36,10 +36,10 @@ def grouped_options(command: Callable[..., None]) -> Callable[..., None]:
             parameters.append(each.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[each.name]))
 
     @wraps(command)
-    def with_options(**given: Any) -> None:
+    def with_options(*words: Any, **given: Any) -> None:
         for name, group in groups.items():
             given[name] = group(*(given.pop(option) for option in group._fields))
-        command(**given)
+        command(*words, **given)
 
     take(with_options, parameters)
     return with_options

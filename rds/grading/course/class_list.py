@@ -19,7 +19,7 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.grading.intake.names import compared, letters
-from rds.grading.table_text import rows_by_heading
+from rds.grading.table_text import read_table, rows_by_heading
 
 FILE = "class.csv"
 COLUMNS = ("student", "name", "email", "section", "group", "extension_days", "late_days")
@@ -110,15 +110,7 @@ class ClassList:
 
 def read_class_list(path: Path) -> ClassList:
     """The table at `path`. InputError with its line for a column, a number or a student that will not do."""
-    try:
-        if path.stat().st_size > _LARGEST:
-            raise InputError(f"has more than {_LARGEST} bytes; name a table of students", str(path))
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}; name the class list", str(path)) from error
-    except UnicodeDecodeError as error:
-        raise InputError("is no text in UTF-8; save it as CSV UTF-8", str(path)) from error
-    reader = rows_by_heading(text, str(path))
+    reader = rows_by_heading(read_table(path, _LARGEST, "students", "class list"), str(path))
     columns = [name.strip() for name in reader.fieldnames or ()]
     if "student" not in columns or len(set(columns)) < len(columns) or not set(columns) <= set(COLUMNS):
         raise InputError(

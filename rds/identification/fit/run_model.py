@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rds.core.errors import InputError
 from rds.core.integrate import SUBSTEPS
 from rds.core.load import StudentFile, load_student
-from rds.core.types import Model, Source
+from rds.core.types import SPINDLE_UNIT, Model, Source
 from rds.identification.fit.model_file import ModelFile, file_sha256, read_model
 from rds.identification.structures.signals import POSITIONS, VOLTS
 from rds.identification.structures.structure import Structure
@@ -22,8 +22,6 @@ from rds.models.student import student_model
 
 if TYPE_CHECKING:
     from rds.checks import FileReport
-
-SPINDLE_UNIT = "rev/min"
 
 
 def run_model(
