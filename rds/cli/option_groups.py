@@ -38,7 +38,7 @@ def grouped_options(command: Callable[..., None]) -> Callable[..., None]:
     @wraps(command)
     def with_options(*words: Any, **given: Any) -> None:
         for name, group in groups.items():
-            given[name] = group(*(given.pop(option) for option in group._fields))
+            given[name] = group(**{option: given.pop(option) for option in group._fields if option in given})
         command(*words, **given)
 
     take(with_options, parameters)

@@ -86,7 +86,7 @@ class EquipmentRun:
                     self.prepared = PATHS.module("path").as_prepared(program, Path(program.name), self.plan.T)
                 self._tell(task, "starting the loop" if self.real_time else "simulating")
                 # before the first sample the loop is still being started, and its note stays; so does that of a stop
-                self._follow(
+                return self._follow(
                     *(task, held, lambda: experiment.start(out=self.folder)),
                     lambda taken, of, note: task.advance(taken, of, note if taken else ""),
                 )
@@ -96,7 +96,6 @@ class EquipmentRun:
                     keep_choices(self.folder, self.table)
                     judged = self.plan.program if "program" in self.result.meta else None  # one that failed may not be
                     self._write_files(save_run, self.result, judged, self.folder, self.title, held=held)
-            return self.result
 
     def _follow(
         self,
@@ -104,7 +103,7 @@ class EquipmentRun:
         held: contextlib.ExitStack,
         start: Callable[[], Run],
         advance: Callable[[int, int, str], None],
-    ) -> None:
+    ) -> Result:
         """Start the run and wait for its result; `advance(taken, of, note)` hears of each look at it."""
         held.enter_context(saving(self.folder))
         self._run = run = start()
@@ -112,7 +111,8 @@ class EquipmentRun:
             run.stop()
         running = "running" if self.real_time else "simulating"
         try:
-            self.result = run.wait(lambda taken, of: advance(taken, of, "" if task.stopping else running))
+            self.result = result = run.wait(lambda taken, of: advance(taken, of, "" if task.stopping else running))
+            return result
         except ContractError as error:  # what there is up to the fault is a result
             self.result = error.result if isinstance(error, FailedRun) else _recorded(self.folder)
             raise

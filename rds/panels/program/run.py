@@ -68,7 +68,7 @@ class ProgramWork(EquipmentRun):
                 )
                 self.plan, self.prepared = part.plan(), part.prepared
                 self._tell(task, "starting the loop" if self.real_time else "simulating")
-                self._follow(
+                return self._follow(
                     *(task, held, lambda: part.start(out=self.folder, changes=self._changes)),
                     lambda taken, of, note: task.advance(taken, max(of, taken), note),
                 )
@@ -76,7 +76,6 @@ class ProgramWork(EquipmentRun):
                 self.session.give_machine_back(self)
                 if self.result is not None and "program" in self.result.meta:
                     self._write_files(save_run, self.result, self.prepared, self.folder, held=held)
-            return self.result
 
     # what a progress bar follows: waiting is no progress
 
