@@ -13,8 +13,9 @@ from typing import Annotated, Any
 import typer
 
 from rds.bus.tools.log_formats import in_words
-from rds.cli.buses import BUILTIN, Bitrate, Channel, ChosenBus, Experiment, Interface, chosen_bus
+from rds.cli.buses import BUILTIN, BusOptions, Channel, ChosenBus, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, print_json, refusals, stdout_kept, until_ctrl_c, writes_files
+from rds.cli.option_groups import grouped_options
 
 app = typer.Typer(no_args_is_help=True, help="The bus: monitor, record and replay it, offer it to other tools.")
 
@@ -53,7 +54,8 @@ def monitor(
 
         place = chosen_bus(interface, channel, experiment)
         builtin = place.interface == BUILTIN
-        opener = _opener(place, None if builtin else bitrate, "monitor", errors=True)
+        rate = {} if builtin or bitrate is None else {"bitrate": bitrate}
+        opener = _opener(place, "monitor", errors=True, **rate)
         its_own = _timing(opener) if builtin else _bits(place.options.get("bitrate"))
         data_bitrate = data_bitrate or _bits(place.options.get("data_bitrate")) or None
         statistics = Statistics(bitrate or its_own or BITRATE, data_bitrate)
@@ -81,10 +83,7 @@ def monitor(
 @writes_files
 def record(
     file: Annotated[Path, typer.Argument(help=f"The log; its ending is its format: {in_words()}.")],
-    interface: Interface = None,
-    channel: Channel = None,
-    experiment: Experiment = None,
-    bitrate: Bitrate = None,
+    on_bus: BusOptions,
     seconds: Seconds = None,
     count: Annotated[int | None, typer.Option(help="End after so many frames.", min=1)] = None,
     identifiers: Identifiers = None,
@@ -96,12 +95,12 @@ def record(
         from rds.bus.tools.record import record as record_bus
         from rds.bus.tools.selection import Selection
 
-        place = chosen_bus(interface, channel, experiment)
+        place = on_bus.chosen()
         selection = Selection(identifiers or ())
         with _quiet_log(False), until_ctrl_c() as stop, _counter("frames recorded") as show:
             result = record_bus(
                 file,
-                _opener(place, bitrate, "recorder", errors=True),
+                _opener(place, "recorder", errors=True),
                 name=place.name,
                 seconds=seconds,
                 count=count,
@@ -123,12 +122,10 @@ def record(
 
 
 @app.command()
+@grouped_options
 def replay(
     file: Annotated[Path, typer.Argument(help="A log of any of python-can's formats.")],
-    interface: Interface = None,
-    channel: Channel = None,
-    experiment: Experiment = None,
-    bitrate: Bitrate = None,
+    on_bus: BusOptions,
     speed: Annotated[
         float, typer.Option(help="2: twice as fast as recorded; inf: as fast as the bus takes them.")
     ] = 1.0,
@@ -145,12 +142,12 @@ def replay(
         from rds.bus.tools.replay import replay as replay_log
         from rds.bus.tools.selection import Selection
 
-        place = chosen_bus(interface, channel, experiment)
+        place = on_bus.chosen()
         log = LogFile(file)
         selection = Selection(identifiers or ())
         with (
             _command_of(place, with_commands),
-            _opener(place, bitrate, "replay")() as bus,
+            _opener(place, "replay")() as bus,
             _quiet_log(False),
             until_ctrl_c() as stop,
             _counter("frames sent") as show,
@@ -183,11 +180,9 @@ def replay(
 
 
 @app.command("serve-socketcand")
+@grouped_options
 def serve_socketcand(
-    interface: Interface = None,
-    channel: Channel = None,
-    experiment: Experiment = None,
-    bitrate: Bitrate = None,
+    on_bus: BusOptions,
     host: Annotated[str, typer.Option(help="Loopback address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="TCP port; 0 takes a free one.")] = 29536,
     with_commands: WithCommands = False,
@@ -200,8 +195,8 @@ def serve_socketcand(
     with refusals():
         from rds.bus.tools.socketcand import Server
 
-        place = chosen_bus(interface, channel, experiment)
-        opener = _opener(place, bitrate, "socketcand", errors=True)
+        place = on_bus.chosen()
+        opener = _opener(place, "socketcand", errors=True)
         name = place.interface if place.channel in (None, "") else str(place.channel)  # what clients open
         with (
             _quiet_log(False),
@@ -219,11 +214,9 @@ def serve_socketcand(
 
 
 @app.command("serve-slcan")
+@grouped_options
 def serve_slcan(
-    interface: Interface = None,
-    channel: Channel = None,
-    experiment: Experiment = None,
-    bitrate: Bitrate = None,
+    on_bus: BusOptions,
     latency: Annotated[
         float,
         typer.Option(help="Frames wait up to so many ms, as in USB chips that collect bytes.", min=0.0, max=100.0),
@@ -236,11 +229,11 @@ def serve_slcan(
     with refusals():
         from rds.bus.tools.slcan_adapter import SlcanAdapter
 
-        place = chosen_bus(interface, channel, experiment)
+        place = on_bus.chosen()
         builtin = place.interface == BUILTIN
         options = {"receive_own_messages": True} if builtin else {}
         with (
-            _opener(place, bitrate, "adapter")(**options) as bus,
+            _opener(place, "adapter")(**options) as bus,
             until_ctrl_c() as stop,
             SlcanAdapter(bus, latency * 1e-3, garble, bus_bitrate=_timed(bus), gives_back=builtin) as adapter,
         ):
@@ -251,11 +244,11 @@ def serve_slcan(
                 pass
 
 
-def _opener(place: ChosenBus, bitrate: int | None, node: str, errors: bool = False) -> Any:
+def _opener(place: ChosenBus, node: str, errors: bool = False, **more: Any) -> Any:
     """Opens the bus; on the built-in one as `node`, and with `errors` hearing of its controller's errors."""
     from rds.bus.tools.link import open_bus
 
-    options = place.options | ({} if bitrate is None else {"bitrate": bitrate})
+    options = place.options | more
     if place.interface == BUILTIN and errors:
         options["error_frames"] = True
     return partial(open_bus, place.interface, place.channel, node=node, **options)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -75,6 +75,19 @@ class ChosenBus:
             yield bus
         finally:
             bus.shutdown()
+
+
+class BusOptions(NamedTuple):
+    """The options by which most commands are told their bus."""
+
+    interface: Interface = None
+    channel: Channel = None
+    bitrate: Bitrate = None
+    experiment: Experiment = None
+
+    def chosen(self) -> ChosenBus:
+        """See `chosen_bus`."""
+        return chosen_bus(self.interface, self.channel, self.experiment, self.bitrate)
 
 
 def bus_table_of(

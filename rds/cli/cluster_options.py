@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -38,20 +38,31 @@ Insecure = Annotated[
 ]
 
 
-def scheduler_of(
-    address: str | None, ca: Path | None, cert: Path | None, key: Path | None, insecure: bool
-) -> Scheduler | None:
-    """What these options say; InputError for those of a cluster without one."""
-    if address is None:
-        given = {"--tls-ca": ca, "--tls-cert": cert, "--tls-key": key, "--insecure-cluster": insecure or None}
-        if lone := [option for option, value in given.items() if value is not None]:
-            raise InputError(f"{' and '.join(lone)} without --scheduler; give its address, as tls://HOST:8786")
-        return None
-    from rds.core.parallel.scheduler import ClusterWarning, Scheduler
+class ClusterOptions(NamedTuple):
+    """All of them."""
 
-    found = Scheduler(address, ca, cert, key, insecure)
-    found.check()
-    if warning := found.warning():
-        typer.echo(f"rds: warning: {warning}", err=True)
-        warnings.simplefilter("ignore", ClusterWarning)  # it has been said
-    return found
+    scheduler: Address = None
+    tls_ca: Ca = None
+    tls_cert: Cert = None
+    tls_key: Key = None
+    insecure_cluster: Insecure = False
+
+    def given(self) -> list[str]:
+        """Those that are given."""
+        values = {f"--{name.replace('_', '-')}": value for name, value in self._asdict().items()}
+        return [option for option, value in values.items() if value not in (None, False)]
+
+    def chosen(self) -> Scheduler | None:
+        """What these options say; InputError for those of a cluster without one."""
+        if self.scheduler is None:
+            if lone := self.given():
+                raise InputError(f"{' and '.join(lone)} without --scheduler; give its address, as tls://HOST:8786")
+            return None
+        from rds.core.parallel.scheduler import ClusterWarning, Scheduler
+
+        found = Scheduler(self.scheduler, self.tls_ca, self.tls_cert, self.tls_key, self.insecure_cluster)
+        found.check()
+        if warning := found.warning():
+            typer.echo(f"rds: warning: {warning}", err=True)
+            warnings.simplefilter("ignore", ClusterWarning)  # it has been said
+        return found

@@ -15,12 +15,14 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from functools import wraps
+from inspect import Parameter
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
 import typer
 
+from rds.cli.option_groups import grouped_options, take
 from rds.core.private_files import keep_process_private, share
 from rds.core.progress import Progress as TellsProgress
 from rds.core.quantities import Quantity
@@ -56,7 +58,8 @@ _Shared = Annotated[bool, typer.Option("--shared", help="Let your group read wha
 
 
 def writes_files(command: Callable[..., None]) -> Callable[..., None]:
-    """The same command with the option --shared: every command that writes files has it."""
+    """The same command with --shared, which every command has that writes files, and `grouped_options`."""
+    command = grouped_options(command)
 
     @wraps(command)
     def with_option(*words: Any, shared: bool = False, **options: Any) -> None:
@@ -65,12 +68,8 @@ def writes_files(command: Callable[..., None]) -> Callable[..., None]:
             keep_process_private()  # again: for the group's umask
         command(*words, **options)
 
-    hints = get_type_hints(command, include_extras=True)  # words, until now: typer would miss what options are called
-    of = inspect.signature(command).parameters.values()
-    option = inspect.Parameter("shared", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_Shared)
-    parameters = [*(each.replace(annotation=hints[each.name]) for each in of), option]
-    with_option.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    with_option.__annotations__ = {each.name: each.annotation for each in parameters}
+    option = Parameter("shared", Parameter.KEYWORD_ONLY, default=False, annotation=_Shared)
+    take(with_option, [*inspect.signature(command).parameters.values(), option])
     return with_option
 
 

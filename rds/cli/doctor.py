@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rds.cli.buses import BUILTIN, Bitrate, Channel, Experiment, Interface, chosen_bus
+from rds.cli.buses import BUILTIN, BusOptions
 from rds.cli.common import Json, print_json, progress_bars, refusals
+from rds.cli.option_groups import grouped_options
 
 if TYPE_CHECKING:
     from rds.bus.tools.adapter_test import AdapterReport
 
 
+@grouped_options
 def doctor(
+    *,
     bus: Annotated[bool, typer.Option("--bus", help="Examine a bus and the adapter to it.")] = False,
     count: Annotated[int, typer.Option(help="Questions that are asked.", min=10, max=1_000_000)] = 1000,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     json: Json = False,
 ) -> None:
     """Examine a bus and its adapter: round trips, losses, errors, and what sample period it would carry.
@@ -32,7 +32,7 @@ def doctor(
 
         if not bus:
             raise InputError("say what to examine: rds doctor --bus")
-        place = chosen_bus(interface, channel, experiment, bitrate)
+        place = on_bus.chosen()
         if place.is_line:
             raise InputError("a serial line of units has a scan of its own: rds scan --interface serial")
         if place.interface == BUILTIN:

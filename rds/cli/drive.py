@@ -10,8 +10,9 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli.buses import BUILTIN, Bitrate, Channel, ChosenBus, Experiment, Interface, chosen_bus
+from rds.cli.buses import BUILTIN, BusOptions, ChosenBus
 from rds.cli.common import Json, ends_as_ctrl_c, print_json, refusals, writes_files
+from rds.cli.option_groups import grouped_options
 
 app = typer.Typer(no_args_is_help=True, help="CiA 402 drives out of the box: set-up, node-ID, stored parameters.")
 
@@ -25,6 +26,7 @@ Yes = Annotated[
 @app.command()
 @writes_files
 def setup(
+    *,
     out: Annotated[Path, typer.Option("--out", "-o", help="The machine file; the experiment goes beside it.")] = Path(
         "drive.toml"
     ),
@@ -47,10 +49,7 @@ def setup(
         int | None, typer.Option(help="-1 if the drive counts against the axis's direction; else it is asked.")
     ] = None,
     store: Annotated[bool, typer.Option("--store", help="Keep the drive's parameters in it (0x1010).")] = False,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     yes: Yes = False,
     json: Json = False,
@@ -79,7 +78,7 @@ def setup(
         for path in (out, sine, steps):
             if path.exists() and not force:
                 raise InputError("there is such a file already; choose another name, or give --force", str(path))
-        place = chosen_bus(interface, channel, experiment, bitrate)
+        place = on_bus.chosen()
         number = _the_node(place, node)
         options = CommissioningOptions(
             number, axis, unit, lead, counts, travel, sample_period, mode, eds, torque, distance, keep_in_drive=store
@@ -101,12 +100,10 @@ def setup(
 
 
 @app.command("node-id")
+@grouped_options
 def node_id(
     to: Annotated[int, typer.Argument(metavar="NODE", help="The node-ID that it gets.", min=1, max=127)],
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     temporary: Annotated[
         bool, typer.Option("--temporary", help="Do not store it in the drive: it is gone when that is switched off.")
     ] = False,
@@ -117,7 +114,7 @@ def node_id(
     with refusals():
         from rds.bus.modules.cia402.lss import give_node_id
 
-        place = chosen_bus(interface, channel, experiment, bitrate)
+        place = on_bus.chosen()
         _agreed(f"give node-ID {to} to the drive without one on {place.name}", yes)
         with _opened(place) as bus:
             found = give_node_id(bus, to, keep=not temporary)
@@ -129,36 +126,22 @@ def node_id(
 
 
 @app.command()
-def store(
-    node: Node = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
-    yes: Yes = False,
-) -> None:
+@grouped_options
+def store(*, node: Node = None, on_bus: BusOptions, yes: Yes = False) -> None:
     """Keep a drive's parameters in it, also when it is switched off (object 0x1010)."""
     from rds.bus.modules.cia402 import parameters
 
-    _parameters(
-        parameters.store, "keep its parameters", chosen_bus, (interface, channel, experiment, bitrate), node, yes
-    )
+    _parameters(parameters.store, "keep its parameters", on_bus, node, yes)
 
 
 @app.command()
-def restore(
-    node: Node = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
-    yes: Yes = False,
-) -> None:
+@grouped_options
+def restore(*, node: Node = None, on_bus: BusOptions, yes: Yes = False) -> None:
     """Reset a drive's parameters to its manufacturer's: from when it is switched on again (object 0x1011)."""
     from rds.bus.modules.cia402 import parameters
 
     what = "forget its parameters, and take its manufacturer's when it is switched on again"
-    _parameters(parameters.restore, what, chosen_bus, (interface, channel, experiment, bitrate), node, yes)
+    _parameters(parameters.restore, what, on_bus, node, yes)
 
 
 class _Terminal:
@@ -187,15 +170,13 @@ class _Terminal:
         )
 
 
-def _parameters(
-    does: Callable[[Any], None], what: str, choose: Callable[..., ChosenBus], where: Any, node: int | None, yes: bool
-) -> None:
+def _parameters(does: Callable[[Any], None], what: str, on_bus: BusOptions, node: int | None, yes: bool) -> None:
     with refusals():
         import canopen
 
         from rds.bus.modules.cia402.configure import library
 
-        place = choose(*where)
+        place = on_bus.chosen()
         number = _the_node(place, node)
         _agreed(f"let node {number} {what}", yes)
         with _opened(place) as bus, library(bus) as network:

@@ -6,17 +6,17 @@ from typing import Annotated
 
 import typer
 
-from rds.cli.buses import Baud, Bitrate, Channel, Experiment, Interface, chosen_bus, refuse_baud
+from rds.cli.buses import Baud, BusOptions, refuse_baud
 from rds.cli.common import Json, print_json, refusals
+from rds.cli.option_groups import grouped_options
 
 
+@grouped_options
 def estop(
+    *,
     reset: Annotated[bool, typer.Option("--reset", help="Release the latch of an emergency stop.")] = False,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
+    on_bus: BusOptions,
     baud: Baud = None,
-    experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Emergency stop of every module on a bus: zero volts, whatever its dialect; exit code 1 if nobody answers.
@@ -29,7 +29,7 @@ def estop(
         from rds.bus.tools.estop import reset_everything, stop_everything
         from rds.core.errors import InputError
 
-        place = chosen_bus(interface, channel, experiment, bitrate)
+        place = on_bus.chosen()
         refuse_baud(place, baud)
         if place.is_line:
             if reset:

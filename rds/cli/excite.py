@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -56,17 +55,13 @@ def excite(
             from rds.identification.fit.excitation_plot import excitation_picture
 
             files[plot] = excitation_picture(found).png()
-        write_files({path: partial(_fill, data) for path, data in files.items()})
+        write_files(files)
     if json:
         print_json(_json(found) | {"files": [str(path) for path in files]})
         return
     _show(found)
     for path in files:
         typer.echo(f"{'experiment' if path == out else 'picture'}: {path}")
-
-
-def _fill(data: bytes, stream: BinaryIO) -> None:
-    stream.write(data)
 
 
 def _task(machine: Machine, axis: str, model: Path | None, duration: float, noise: float) -> Task:

@@ -8,13 +8,14 @@ from typing import Annotated, Any
 import typer
 
 from rds.cli.common import Json, named_values, print_json, progress_bars, refusals, save_picture, writes_files
-from rds.cli.nc_options import MaxJumps, Parameters, Tools, With, setup
+from rds.cli.nc_options import ProgramOptions
 
 
 @writes_files
 def forces(
     machine: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
     program: Annotated[Path, typer.Argument(help="The part program (RS274NGC, as LinuxCNC reads it).")],
+    *,
     cut: Annotated[
         Path | None, typer.Option(help="A file that says the cut and its limits; or the options below.")
     ] = None,
@@ -39,10 +40,7 @@ def forces(
             metavar="NAME=VALUE", help="What is borne: force=40 (N), a joint's X=60 (N), C=2 (N m), power=160 (W)."
         ),
     ] = None,
-    tools: Tools = None,
-    parameters: Parameters = None,
-    with_: With = None,
-    max_jumps: MaxJumps = None,
+    reading: ProgramOptions,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="A picture: png, svg or pdf.")] = None,
     json: Json = False,
 ) -> None:
@@ -69,7 +67,7 @@ def forces(
         made = read_cut(cut) if cut is not None else cut_of(given)
         of = load_machine(machine)
         with progress_bars() as bar:
-            prepared = prepare(program, of, setup(tools, parameters, with_, max_jumps), progress=bar("check"))
+            prepared = prepare(program, of, reading.setup(), progress=bar("check"))
         found = program_forces(prepared, of, made)
         if out is not None:
             save_picture(picture(found), out)

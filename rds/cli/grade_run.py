@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rds.cli import cluster_options
+from rds.cli.cluster_options import ClusterOptions
 from rds.cli.common import (
     Json,
     ends_as_ctrl_c,
@@ -38,12 +38,9 @@ def run(
     assignment: Annotated[Path, typer.Argument(help="The assignment's folder.")],
     submissions: Annotated[Path, typer.Argument(help="Folder of submissions, or a zip as the platform exports it.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for grades and feedback; a new one.")],
+    *,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="Local processes; default: all.")] = None,
-    scheduler: cluster_options.Address = None,
-    tls_ca: cluster_options.Ca = None,
-    tls_cert: cluster_options.Cert = None,
-    tls_key: cluster_options.Key = None,
-    insecure_cluster: cluster_options.Insecure = False,
+    on_cluster: ClusterOptions,
     class_list: Annotated[
         Path | None, typer.Option("--class", help="The class list: sections, groups, extensions, late days.")
     ] = None,
@@ -63,21 +60,14 @@ def run(
     try:
         if container:
             with refusals():
-                of_cluster: dict[str, object] = {
-                    "--scheduler": scheduler,
-                    "--insecure-cluster": insecure_cluster or None,
-                    "--tls-ca": tls_ca,
-                    "--tls-cert": tls_cert,
-                    "--tls-key": tls_key,
-                }
-                if given := [option for option, value in of_cluster.items() if value is not None]:
+                if given := on_cluster.given():
                     raise InputError(f"--container grades on this computer alone; leave out {' and '.join(given)}")
                 raise typer.Exit(_in_container(assignment, submissions, out, jobs, class_list, against, resume, json))
         with refusals(), stdout_kept(json), ends_as_ctrl_c():
             needs_sandbox()
             from rds.grading.batch.run import run_batch
 
-            cluster = cluster_options.scheduler_of(scheduler, tls_ca, tls_cert, tls_key, insecure_cluster)
+            cluster = on_cluster.chosen()
             with progress_bars() as bar, _worker(cluster is None) as first:
                 found = run_batch(
                     assignment,

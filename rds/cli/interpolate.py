@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json as json_text
 from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
 from rds.cli.common import Json, named_values, print_json, progress_bars, refusals, stdout_kept, writes_files
-from rds.cli.nc_options import MachineName, MaxJumps, Parameters, Tools, With, setup
+from rds.cli.nc_options import MachineName, ProgramOptions
 
 if TYPE_CHECKING:
     from rds.core.types import Segment
@@ -26,6 +25,7 @@ _METHOD = "constant-velocity"
 
 @writes_files
 def interpolate(
+    *,
     file: Annotated[
         Path | None, typer.Argument(help="A part program, or a .toml of segments; instead of it, --line or --arc.")
     ] = None,
@@ -61,10 +61,7 @@ def interpolate(
         bool, typer.Option("--exact-stop", help="With --acceleration: come to rest at the end of each segment.")
     ] = False,
     machine: MachineName = "mini-cnc",
-    tools: Tools = None,
-    parameters: Parameters = None,
-    with_: With = None,
-    max_jumps: MaxJumps = None,
+    reading: ProgramOptions,
     plot: Annotated[
         bool, typer.Option("--plot", help="Save pictures too, in --out or the folder interpolation.")
     ] = False,
@@ -72,7 +69,6 @@ def interpolate(
     json: Json = False,
 ) -> None:
     """Position, velocity and acceleration of each axis along a path, and how far it is from what was programmed."""
-    reading = (tools, parameters, with_, max_jumps)
     if profile is not None:
         with refusals():
             _check_words(file, {"--line": line, "--arc": arc}, clockwise, plane, feed)
@@ -95,12 +91,7 @@ def interpolate(
             segments, rests = programmed.segments, programmed.rests
             notes += programmed.notes
         else:
-            of_programs: dict[str, Any] = {
-                "tools": tools,
-                "parameters": parameters,
-                "with": with_,
-                "max-jumps": max_jumps,
-            }
+            of_programs = dict(zip(("tools", "parameters", "with", "max-jumps"), reading, strict=True))
             _check_program_words({"machine": machine != "mini-cnc", **of_programs})
             segments = read_segments(file) if file is not None else _segments(line, arc, clockwise, plane, feed or "")
         done = follow(segments, period, chosen, arcs=arcs, acceleration=filter_, exact_stop=exact_stop, rests=rests)
@@ -220,7 +211,7 @@ def _follow_profile(
     given: dict[str, Any],
     machine: str,
     T: float,
-    reading: tuple[Any, Any, Any, Any],
+    reading: ProgramOptions,
     plot: bool,
     out: Path | None,
     json: bool,
@@ -235,7 +226,7 @@ def _follow_profile(
         if used:
             raise InputError(f"{name} is of interpolators, and --profile takes their place; leave one of them")
     _check_program_file(file, T)
-    follow(profile, file, machine, T, setup(*reading), folder=out or (_FOLDER if plot else None), plot=plot, json=json)
+    follow(profile, file, machine, T, reading.setup(), folder=out or (_FOLDER if plot else None), plot=plot, json=json)
 
 
 def _check_program_file(file: Path, T: float) -> None:
@@ -247,7 +238,7 @@ def _check_program_file(file: Path, T: float) -> None:
         raise InputError("there is no such part program; check the name and the folder", str(file))
 
 
-def _program(file: Path, machine: str, T: float, reading: tuple[Any, Any, Any, Any]) -> Programmed:
+def _program(file: Path, machine: str, T: float, reading: ProgramOptions) -> Programmed:
     from rds.machines import load_machine
     from rds.nc.check import motion
     from rds.nc.interpolator_segments import MOST, program
@@ -256,7 +247,7 @@ def _program(file: Path, machine: str, T: float, reading: tuple[Any, Any, Any, A
     loaded = load_machine(machine)
     with progress_bars() as bar:
         notes: list[str] = []
-        found = program(motion(file, loaded, setup(*reading), bar("read"), notes), loaded, T, MOST)
+        found = program(motion(file, loaded, reading.setup(), bar("read"), notes), loaded, T, MOST)
         return found._replace(notes=[*notes, *found.notes])
 
 
@@ -270,13 +261,9 @@ def _save(done: Interpolation, out: Path | None, plot: bool) -> list[Path]:
         from rds.interpolators.plots import pictures
 
         drawn = {folder / f"{name}.png": picture.png() for name, picture in pictures(done).items()}
-        write_files({path: partial(_write, png) for path, png in drawn.items()})
+        write_files(drawn)
         files += drawn
     return files
-
-
-def _write(data: bytes, stream: BinaryIO) -> None:
-    stream.write(data)
 
 
 def _show(done: Interpolation, notes: list[str], files: list[Path]) -> None:

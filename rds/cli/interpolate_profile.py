@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 import typer
@@ -116,13 +115,9 @@ def _save(result: Result, certificate: Certificate, blocks: list[SampleBlock], f
             drawn["path"] = _path(result, blocks)
         drawn["certificate"] = certificate.plot()
         pictures = {folder / f"{name}.png": picture.png() for name, picture in drawn.items()}
-        write_files({path: partial(_write, png) for path, png in pictures.items()})
+        write_files(pictures)
         files += pictures
     return files
-
-
-def _write(data: bytes, stream: BinaryIO) -> None:
-    stream.write(data)
 
 
 def _motion(result: Result) -> Picture:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli.buses import Bitrate, Channel, Experiment, Interface, Machine, bus_table_of, machine_of
+from rds.cli.buses import BusOptions, Machine, bus_table_of, machine_of
 from rds.cli.common import Json, ends_as_ctrl_c, print_json, refusals
+from rds.cli.option_groups import grouped_options
 
 if TYPE_CHECKING:
     from rds.panels.jog.state import Jog
@@ -23,8 +24,10 @@ _SETTLES = 0.3  # s there, before an axis is let go: the loop still takes the la
 _STANDS = 0.01  # of its highest speed: a spindle that is slower stands
 
 
+@grouped_options
 def jog(
     axis: Annotated[str, typer.Argument(help="The axis, as in X, or the spindle.")],
+    *,
     by: Annotated[float | None, typer.Option(help="Distance, mm or degrees.")] = None,
     to: Annotated[float | None, typer.Option(help="Position, mm or degrees.")] = None,
     find_home: Annotated[
@@ -36,10 +39,7 @@ def jog(
     ] = None,
     seconds: Annotated[float | None, typer.Option("--for", help="How long a spindle turns, s.")] = None,
     machine: Machine = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     json: Json = False,
 ) -> None:
     """Move one axis, turn a spindle or home a drive, hold the others where they are; Ctrl-C or a kill stops it."""
@@ -48,9 +48,9 @@ def jog(
         from rds.panels.jog.state import Jog
         from rds.panels.session.session import Session
 
-        bus = bus_table_of(experiment, interface, channel, bitrate)
+        bus = bus_table_of(on_bus.experiment, on_bus.interface, on_bus.channel, on_bus.bitrate)
         with tempfile.TemporaryDirectory(prefix="rds-jog-") as folder, ends_as_ctrl_c():
-            hand = Jog(Session(Path(folder), machine or machine_of(experiment), bus))
+            hand = Jog(Session(Path(folder), machine or machine_of(on_bus.experiment), bus))
             hand.check(axis)
             ways = {"--by": by, "--to": to, "--find-home": find_home, "--for": seconds}
             named = [way for way, value in ways.items() if value is not None]

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli.buses import Bitrate, Channel, Experiment, Interface, chosen_bus
+from rds.cli.buses import BusOptions
 from rds.cli.common import Json, print_json, refusals, until_ctrl_c, writes_files
 
 _INTERVAL = 0.1  # s between two looks
@@ -22,6 +22,7 @@ def watch(
         str, typer.Argument(help="The machine till now: its name, or the path of its TOML file.", metavar="MACHINE")
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The file of the new machine, MACHINE.toml.")],
+    *,
     yes: Annotated[bool, typer.Option("--yes", help="Accept whatever makes a machine, without asking.")] = False,
     move: Annotated[
         str | None, typer.Option(help="After acceptance, move an axis by so much: X=1 (mm, degrees).")
@@ -31,10 +32,7 @@ def watch(
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="End after so long; by default with Ctrl-C.", min=0.0)] = None,
     once: Annotated[bool, typer.Option("--once", help="End with the first machine that is accepted.")] = False,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the files of --out and --events.")] = False,
     json: Json = False,
 ) -> None:
@@ -56,9 +54,9 @@ def watch(
             raise InputError("there is such a file already; choose another name, or give --force", str(out))
         motion = _motion(move) if move else None
         before = load_machine(machine)
-        place = chosen_bus(
-            interface, channel or (None if experiment or interface else before.name), experiment, bitrate
-        )
+        if not (on_bus.channel or on_bus.experiment or on_bus.interface):
+            on_bus = on_bus._replace(channel=before.name)
+        place = on_bus.chosen()
         bus = stack.enter_context(place.opened())
         offers = Offers(bus, before)
         file = EventFile(events, force) if events is not None else None

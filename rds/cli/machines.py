@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli.buses import Bitrate, Channel, ChosenBus, Experiment, Interface, chosen_bus
+from rds.cli.buses import BusOptions, ChosenBus
 from rds.cli.common import Json, print_json, refusals, writes_files
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ JOINTS = "Joint values by name, as in X=10,A=30 (mm, degrees); joints that are n
 @writes_files
 def new(
     out: Out,
+    *,
     script: Annotated[
         Path | None,
         typer.Argument(
@@ -54,10 +55,7 @@ def new(
             "machine of the package with such modules, or chosen.",
         ),
     ] = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -72,7 +70,7 @@ def new(
         if ways != 1:
             given = "none is given" if not ways else f"{ways} are given"
             raise InputError(f"{given}: name a script, or ask the bus with --scan, or name --modules of the library")
-        if not scan and (order or interface or channel or bitrate or experiment):
+        if not scan and (order or any(on_bus)):
             raise InputError(
                 "--order, --interface, --channel, --bitrate and --experiment belong to --scan, which is not given"
             )
@@ -83,7 +81,7 @@ def new(
         if modules is not None:
             text = text_of_modules([each.strip() for each in modules.split(",")], out.stem)
         elif scan:
-            text = _scanned(out.stem, order, before, chosen_bus(interface, channel, experiment, bitrate))
+            text = _scanned(out.stem, order, before, on_bus.chosen())
         else:
             text = _from_file(script, out.stem, before)
         judged = verdict(_readable(text, out.name))

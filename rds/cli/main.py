@@ -5,7 +5,8 @@ Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained
 A command is a function in a file of its own whose arguments say their help (typer); its docstring is the command's. It
 is imported and added here, and named under one of the HEADINGS. What fails in it is raised as InputError inside
 `common.refusals()`; one that writes has the decorator `common.writes_files`, one whose help lists parts of a library
-the class `library.NamesParts`.
+the class `library.NamesParts`. Options of a bus, a program's reading or a cluster are one parameter, `BusOptions`,
+`ProgramOptions` or `ClusterOptions`: `option_groups.grouped_options`, which is in `writes_files`, makes options of it.
 """
 
 from __future__ import annotations

@@ -11,14 +11,13 @@ from typing import Annotated, Any
 import typer
 
 from rds.bus.modules.oacs.pid import MEANINGS
-from rds.cli.buses import Bitrate, Channel, Experiment, Interface, chosen_bus
+from rds.cli.buses import BusOptions
 from rds.cli.common import Json, ends_as_ctrl_c, named_values, print_json, progress_bars, refusals, writes_files
+from rds.cli.option_groups import grouped_options
 
 module_app = typer.Typer(
     no_args_is_help=True, help="One distributed module (oacs dialect): information, tuning, motions, recorded steps."
 )
-
-Place = tuple[str | None, str | None, Path | None, int | None]  # --interface, --channel, --experiment, --bitrate
 
 
 def _refused(sentence: str) -> Exception:
@@ -37,21 +36,23 @@ def module(
 
 
 @contextmanager
-def _module(context: typer.Context, place: Place) -> Iterator[Any]:
+def _module(context: typer.Context, on_bus: BusOptions) -> Iterator[Any]:
     from rds.bus.modules.oacs.remote import Module
 
     with refusals():
-        chosen = chosen_bus(*place)
+        chosen = on_bus.chosen()
         if chosen.dialect == "cia402":
-            raise _refused(f'[bus] of {place[2]} says dialect = "cia402": drives are moved and homed by `rds jog`')
+            raise _refused(
+                f'[bus] of {on_bus.experiment} says dialect = "cia402": drives are moved and homed by `rds jog`'
+            )
         with chosen.opened() as bus:
             yield Module(bus, context.obj)
 
 
 @contextmanager
-def _moving(context: typer.Context, place: Place) -> Iterator[Any]:
+def _moving(context: typer.Context, on_bus: BusOptions) -> Iterator[Any]:
     """A module that moves: Ctrl-C, a polite kill and a closed terminal stop it."""
-    with ends_as_ctrl_c(), _module(context, place) as module:
+    with ends_as_ctrl_c(), _module(context, on_bus) as module:
         try:
             yield module
         except KeyboardInterrupt:
@@ -61,16 +62,10 @@ def _moving(context: typer.Context, place: Place) -> Iterator[Any]:
 
 
 @module_app.command()
-def info(
-    context: typer.Context,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
-    json: Json = False,
-) -> None:
+@grouped_options
+def info(context: typer.Context, on_bus: BusOptions, json: Json = False) -> None:
     """Download what the module says of itself, and its tuning."""
-    with _module(context, (interface, channel, experiment, bitrate)) as module:
+    with _module(context, on_bus) as module:
         found = module.info().as_dict()
     if json:
         print_json(found)
@@ -80,21 +75,20 @@ def info(
 
 
 @module_app.command()
+@grouped_options
 def tune(
     context: typer.Context,
+    *,
     controller: Annotated[str | None, typer.Option(help="P, PI or PID; P is PI with Ki = 0.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A tuning parameter.")] = None,
     from_step: Annotated[
         Path | None, typer.Option(help="Gains by Ziegler and Nichols from a recorded step (rds module ID step).")
     ] = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     json: Json = False,
 ) -> None:
     """Select P, PI or PID and set gains and limits; without options, show what is in force."""
-    with _module(context, (interface, channel, experiment, bitrate)) as module:
+    with _module(context, on_bus) as module:
         parameters = _parameters(set_ or ())
         if from_step is not None:
             controller = controller or module.tuning().controller.name  # the gains of another one would not fit it
@@ -127,14 +121,13 @@ def _parameters(texts: Sequence[str]) -> dict[str, float]:
 
 
 @module_app.command()
+@grouped_options
 def move(
     context: typer.Context,
+    *,
     by: Annotated[float | None, typer.Option(help="Distance, mm or degrees, positive clockwise.")] = None,
     to: Annotated[float | None, typer.Option(help="Point, mm or degrees.")] = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     json: Json = False,
 ) -> None:
     """Move by a distance or to a point, and say where it stands then."""
@@ -142,50 +135,33 @@ def move(
         with refusals():
             given = "neither is given" if by is None else "both are given"
             raise _refused(f"{given}: move by a distance with --by, or to a point with --to, as in --by 5")
-    _moved(
-        context,
-        (interface, channel, experiment, bitrate),
-        json,
-        lambda module, show: module.move(by=by, to=to, progress=show),
-    )
+    _moved(context, on_bus, json, lambda module, show: module.move(by=by, to=to, progress=show))
 
 
 @module_app.command(context_settings={"ignore_unknown_options": True})  # or -1 would be taken for an option
+@grouped_options
 def jog(
     context: typer.Context,
     direction: Annotated[int, typer.Argument(help="1 clockwise, -1 counter-clockwise.")],
+    *,
     seconds: Annotated[float, typer.Option(help="How long, s.")] = 0.5,
     duty: Annotated[float, typer.Option(help="Share of the supply voltage, up to 1.")] = 1.0,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     json: Json = False,
 ) -> None:
     """Run for a time, a tool too; it also ends if this command is killed."""
-    _moved(
-        context,
-        (interface, channel, experiment, bitrate),
-        json,
-        lambda module, show: module.jog(direction, seconds, duty),
-    )
+    _moved(context, on_bus, json, lambda module, show: module.jog(direction, seconds, duty))
 
 
 @module_app.command()
-def home(
-    context: typer.Context,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
-    json: Json = False,
-) -> None:
+@grouped_options
+def home(context: typer.Context, on_bus: BusOptions, json: Json = False) -> None:
     """Find the zero."""
-    _moved(context, (interface, channel, experiment, bitrate), json, lambda module, show: module.home(progress=show))
+    _moved(context, on_bus, json, lambda module, show: module.home(progress=show))
 
 
-def _moved(context: typer.Context, place: Place, json: bool, act: Any) -> None:
-    with _moving(context, place) as module:
+def _moved(context: typer.Context, on_bus: BusOptions, json: bool, act: Any) -> None:
+    with _moving(context, on_bus) as module:
         unit = module.description.unit
         with _position(f"module {context.obj}", unit) as show:
             reached = act(module, show)
@@ -213,63 +189,37 @@ def _position(name: str, unit: str) -> Iterator[Any]:
 
 
 @module_app.command()
-def stop(
-    context: typer.Context,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
-    json: Json = False,
-) -> None:
+@grouped_options
+def stop(context: typer.Context, on_bus: BusOptions, json: Json = False) -> None:
     """Zero volts now."""
-    with _module(context, (interface, channel, experiment, bitrate)) as module:
+    with _module(context, on_bus) as module:
         module.stop()
-    if json:
-        print_json({"stopped": context.obj})
-    else:
-        typer.echo("stopped")
+    print_json({"stopped": context.obj}) if json else typer.echo("stopped")
 
 
 @module_app.command()
-def switch(
-    context: typer.Context,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
-    json: Json = False,
-) -> None:
+@grouped_options
+def switch(context: typer.Context, on_bus: BusOptions, json: Json = False) -> None:
     """Turn the motion under way round, from a second terminal: what is left of the way, the other way."""
-    with _module(context, (interface, channel, experiment, bitrate)) as module:
+    with _module(context, on_bus) as module:
         module.switch_direction()
-    if json:
-        print_json({"switched": context.obj})
-    else:
-        typer.echo("switched its direction")
+    print_json({"switched": context.obj}) if json else typer.echo("switched its direction")
 
 
 @module_app.command()
-def reset(
-    context: typer.Context,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
-    json: Json = False,
-) -> None:
+@grouped_options
+def reset(context: typer.Context, on_bus: BusOptions, json: Json = False) -> None:
     """Release the latch of the emergency stop."""
-    with _module(context, (interface, channel, experiment, bitrate)) as module:
+    with _module(context, on_bus) as module:
         module.reset_emergency()
-    if json:
-        print_json({"reset": context.obj})
-    else:
-        typer.echo("emergency stop reset")
+    print_json({"reset": context.obj}) if json else typer.echo("emergency stop reset")
 
 
 @module_app.command()
 @writes_files
 def step(
     context: typer.Context,
+    *,
     by: Annotated[float, typer.Option(help="Step of the set point, mm or degrees.")] = 5.0,
     period: Annotated[float, typer.Option(help="Time between two samples, s; a multiple of 0.01.")] = 0.01,
     settled: Annotated[
@@ -281,14 +231,11 @@ def step(
         typer.Option("--out", "-o", help="Folder for the record and its plot; default: a new one, step-1..."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what is in the folder of --out.")] = False,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
-    experiment: Experiment = None,
+    on_bus: BusOptions,
     json: Json = False,
 ) -> None:
     """Step the set point, record the response and plot it; tell its rise time, overshoot, settling and error."""
-    with _moving(context, (interface, channel, experiment, bitrate)) as module, progress_bars() as bar:
+    with _moving(context, on_bus) as module, progress_bars() as bar:
         folder = folder_for(out, force)
         result = module.step(by, period, settled=settled, progress=bar(f"step by {by:g}"))
         bar("save")

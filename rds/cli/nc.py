@@ -15,7 +15,8 @@ import typer
 from rds.cli import nc_bundled, nc_cut, nc_job, nc_make, nc_methods, nc_operate, nc_run, nc_step
 from rds.cli.canon import print_canon
 from rds.cli.common import Json, declared, print_json, progress_bars, refusals, save_picture, writes_files
-from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
+from rds.cli.nc_options import MachineName, ProfileName, Program, ProgramOptions
+from rds.cli.option_groups import grouped_options
 from rds.core.shared_quantities import SAMPLE_PERIOD
 
 if TYPE_CHECKING:
@@ -37,11 +38,9 @@ for _command in (nc_run.run, nc_operate.operate, nc_methods.methods, nc_bundled.
 @writes_files
 def check(
     file: Program,
+    *,
     machine: MachineName = "mini-cnc",
-    tools: Tools = None,
-    parameters: Parameters = None,
-    with_: With = None,
-    max_jumps: MaxJumps = None,
+    reading: ProgramOptions,
     proof: Annotated[
         bool, typer.Option("--proof", help="Prove the cutter compensation, with a picture of each stretch beside FILE.")
     ] = False,
@@ -53,7 +52,7 @@ def check(
         from rds.nc.check import check_program
 
         of = load_machine(machine)
-        what = setup(tools, parameters, with_, max_jumps).on(of, file)
+        what = reading.setup().on(of, file)
         with progress_bars() as bar:
             result, compiled = check_program(file, of, what, bar("check"))
         proved, pictures = _prove(file, what) if proof else (None, [])
@@ -109,14 +108,8 @@ def _show_proof(proved: Proof | None, pictures: list[Path]) -> None:
 
 
 @app.command()
-def canon(
-    file: Program,
-    tools: Tools = None,
-    parameters: Parameters = None,
-    with_: With = None,
-    max_jumps: MaxJumps = None,
-    json: Json = False,
-) -> None:
+@grouped_options
+def canon(file: Program, reading: ProgramOptions, json: Json = False) -> None:
     """Print the canonical calls of a program, in the form of LinuxCNC's `rs274 -g`: as they are read.
 
     The move after G40 may be as short as LinuxCNC lets it be; `rds nc check` calls a move that gouges a fault.
@@ -124,7 +117,7 @@ def canon(
     with refusals():
         from rds.nc.language.canon_text import texts
 
-        items = setup(tools, parameters, [*(with_ or ()), "any-exit"], max_jumps).interpret(file)
+        items = reading._replace(with_=[*(reading.with_ or ()), "any-exit"]).setup().interpret(file)
         if json:
             calls = (json_text.dumps({"n": n, "call": call}) for n, call in texts(items))
             _print_when_whole(_json_lines(file, calls))
@@ -152,11 +145,9 @@ def _print_when_whole(pieces: Iterator[str]) -> None:
 @writes_files
 def plot(
     file: Program,
+    *,
     machine: MachineName = "mini-cnc",
-    tools: Tools = None,
-    parameters: Parameters = None,
-    with_: With = None,
-    max_jumps: MaxJumps = None,
+    reading: ProgramOptions,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The picture: png, svg or pdf; by default FILE's name -path.png.")
     ] = None,
@@ -176,7 +167,7 @@ def plot(
 
         path = out or file.parent / f"{file.stem}-path.png"
         of = load_machine(machine)
-        what = setup(tools, parameters, with_, max_jumps).on(of, file)
+        what = reading.setup().on(of, file)
         validator = validator_of(file, of, what)
         of = validator.machine
         trace, flat = Trace(), has_no_side(of)
@@ -206,11 +197,9 @@ def plot(
 @writes_files
 def time(
     file: Program,
+    *,
     machine: MachineName = "mini-cnc",
-    tools: Tools = None,
-    parameters: Parameters = None,
-    with_: With = None,
-    max_jumps: MaxJumps = None,
+    reading: ProgramOptions,
     sample_period: Annotated[float | None, declared(SAMPLE_PERIOD, "by default the machine's")] = None,
     profile: ProfileName = "planned",
     why: Annotated[
@@ -231,7 +220,7 @@ def time(
         from rds.nc.check import motion
         from rds.nc.cycle_time import cycle_time
 
-        of, what = load_machine(machine), setup(tools, parameters, with_, max_jumps)
+        of, what = load_machine(machine), reading.setup()
         notes: list[str] = []
         with progress_bars() as bar:
             found = cycle_time(motion(file, of, what, bar("plan"), notes), of, sample_period, profile)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
 import typer
 
 from rds.cli.common import Json, picture_kind, print_json, progress_bars, refusals, writes_files
-from rds.cli.nc_options import MachineName, MaxJumps, Parameters, Program, With, setup
+from rds.cli.nc_options import MachineName, MaxJumps, Parameters, Program, ProgramOptions, With
 
 if TYPE_CHECKING:
     import numpy as np
@@ -71,7 +71,7 @@ def cut(
             raise InputError("is no tool library; a cut needs the shapes of the tools, in a .toml file", str(library))
         path = out or file.parent / f"{file.stem}-cut.png"
         kind = picture_kind(path)
-        of, what = load_machine(machine), setup(library, parameters, with_, max_jumps)
+        of, what = load_machine(machine), ProgramOptions(library, parameters, with_, max_jumps).setup()
         tools = {tool.number: tool for tool in read_library(library)}
         with progress_bars() as bar:
             blocks = list(motion(file, of, what, bar("read")))

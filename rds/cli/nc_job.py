@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO
+from typing import Annotated, Any
 
 import typer
 
@@ -90,15 +89,13 @@ def _layers(file: Path, unit: str | None) -> dict[str, Any]:
 
 
 def _made(file: Path, out: Path, decimals: int) -> dict[str, Any]:
-    from rds.core.atomic import keep_another, write_files
+    from rds.core.atomic import keep_another, write_whole
     from rds.nc.machining.job import read_job
     from rds.nc.paths.measure import total_length
 
     job = read_job(file)
     keep_another(out, "(operation 1: ", "program of `rds nc make job`")
-    text = job.program(decimals).encode()
-    writers: dict[Path, Callable[[BinaryIO], Any]] = {out: lambda stream: stream.write(text)}
-    write_files(writers)
+    write_whole(out, job.program(decimals).encode())
     operations = [
         {
             "title": cut.title,

@@ -13,6 +13,7 @@ import typer
 from typer.models import ArgumentInfo, OptionInfo
 
 from rds.cli.common import Json, declared, print_json, refusals, writes_files
+from rds.cli.option_groups import take
 from rds.cli.option_names import named_by_options
 from rds.core.quantities import Flag, Quantity
 from rds.nc.paths.numbers import BLEND, DECIMALS, HEIGHT, SPINDLE
@@ -83,13 +84,12 @@ def written(
             text = part_program(
                 made.segments, made.title, safe_height=safe, spindle=spindle, blend=blend, decimals=decimals
             ).encode()
-        writers: dict[Path, Callable[[Any], None]] = {out: lambda stream: stream.write(text)}
+        files = {out: text}
         if plot is not None:
             from rds.nc.paths.pictures import picture
 
-            image = picture(made.segments, made.said, drawing=made.drawing).png()
-            writers[plot] = lambda stream: stream.write(image)
-        write_files(writers)
+            files[plot] = picture(made.segments, made.said, drawing=made.drawing).png()
+        write_files(files)
         found: dict[str, Any] = {"file": str(out), "picture": None if plot is None else str(plot)}
         found |= {**summary(made.segments), **made.more}
     if json:
@@ -116,8 +116,7 @@ def maker(make: Callable[..., Made]) -> Callable[..., None]:
         written(**given, make=lambda: make(**mine), options=options)
 
     parameters = [p.replace(kind=p.KEYWORD_ONLY, annotation=hints[p.name]) for p in (*own.values(), *shared.values())]
-    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    command.__annotations__ = {p.name: p.annotation for p in parameters}
+    take(command, parameters)
     return app.command()(writes_files(command))
 
 

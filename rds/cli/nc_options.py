@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -40,28 +40,34 @@ CORRECTION = "correction"
 PROBE = "probe-surface="
 
 
-def setup(
-    tools: Path | None, parameters: Path | None, options: list[str] | None, max_jumps: int | None = None
-) -> Setup:
-    """What a program is read with. InputError for an option that there is not."""
-    from rds.core.errors import InputError
-    from rds.nc.language.dialect import Dialect
-    from rds.nc.setup import Setup
+class ProgramOptions(NamedTuple):
+    """The options by which most commands are told how to read a part program."""
 
-    correct = CORRECTION in (options or ())
-    given: dict[str, Any] = {}
-    for name in options or ():
-        if name.startswith(PROBE):
-            try:
-                given["probe_surface"] = float(name.removeprefix(PROBE))
-            except ValueError:
-                raise InputError(f"--with {name!r}: {PROBE} wants a height in mm, as in {PROBE}-3.5") from None
-    options = [name for name in options or () if name != CORRECTION and not name.startswith(PROBE)]
-    for name in options:
-        if name not in DIALECT:
-            known = ", ".join((*DIALECT, f"{PROBE}Z", CORRECTION))
-            raise InputError(f"--with {name!r} is no option of the dialect; there are {known}")
-    given |= {name.replace("-", "_"): True for name in options}
-    if max_jumps is not None:
-        given["max_jumps"] = max_jumps
-    return Setup(tools, parameters, Dialect(**given), correct)
+    tools: Tools = None
+    parameters: Parameters = None
+    with_: With = None
+    max_jumps: MaxJumps = None
+
+    def setup(self) -> Setup:
+        """What a program is read with. InputError for an option that there is not."""
+        from rds.core.errors import InputError
+        from rds.nc.language.dialect import Dialect
+        from rds.nc.setup import Setup
+
+        correct = CORRECTION in (self.with_ or ())
+        given: dict[str, Any] = {}
+        for name in self.with_ or ():
+            if name.startswith(PROBE):
+                try:
+                    given["probe_surface"] = float(name.removeprefix(PROBE))
+                except ValueError:
+                    raise InputError(f"--with {name!r}: {PROBE} wants a height in mm, as in {PROBE}-3.5") from None
+        options = [name for name in self.with_ or () if name != CORRECTION and not name.startswith(PROBE)]
+        for name in options:
+            if name not in DIALECT:
+                known = ", ".join((*DIALECT, f"{PROBE}Z", CORRECTION))
+                raise InputError(f"--with {name!r} is no option of the dialect; there are {known}")
+        given |= {name.replace("-", "_"): True for name in options}
+        if self.max_jumps is not None:
+            given["max_jumps"] = self.max_jumps
+        return Setup(self.tools, self.parameters, Dialect(**given), correct)

@@ -23,7 +23,7 @@ from rds.cli.common import (
 )
 from rds.cli.exchange import Events, Exchange, Yes, only_with_exchange, runs_json, through_exchanges
 from rds.cli.nc_operate import LEAST_OVERRIDE, operated
-from rds.cli.nc_options import MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
+from rds.cli.nc_options import ProfileName, Program, ProgramOptions
 from rds.core.shared_quantities import FEED_OVERRIDE
 from rds.modes import DEFAULT, mode_names
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 @writes_files
 def run(
     file: Program,
+    *,
     mode: Annotated[
         str | None,
         typer.Option(
@@ -50,10 +51,7 @@ def run(
             "mrmt-oacs).",
         ),
     ] = None,
-    tools: Tools = None,
-    parameters: Parameters = None,
-    with_: With = None,
-    max_jumps: MaxJumps = None,
+    reading: ProgramOptions,
     override: Annotated[float, declared(FEED_OVERRIDE)] = 100.0,
     controller: Annotated[
         str | None,
@@ -151,21 +149,8 @@ def run(
             }
             from rds.cli.nc_serial import by_method
 
-            by_method(
-                given,
-                file,
-                method,
-                machine,
-                mode,
-                motion,
-                rapids,
-                baud,
-                channel,
-                option,
-                out,
-                json,
-                setup(tools, parameters, with_, max_jumps),
-            )
+            setup = reading.setup()
+            by_method(given, file, method, machine, mode, motion, rapids, baud, channel, option, out, json, setup)
             return
         from rds.cli.nc_serial import only_with_method
 
@@ -190,7 +175,7 @@ def run(
             part = PartProgram(
                 file,
                 machine,
-                setup=setup(tools, parameters, with_, max_jumps),
+                setup=reading.setup(),
                 controller=None if experiment is not None else controller,
                 interpolator=_interpolator(interpolator, arc_interpolator, option, look_ahead),
                 acceleration=acceleration_of(acceleration, acceleration_time, None, exact_stop),

@@ -11,17 +11,16 @@ import typer
 
 from rds.cli.canon import until_nobody_reads
 from rds.cli.common import Json, print_json, refusals
-from rds.cli.nc_options import MaxJumps, Parameters, Program, Tools, With, setup
+from rds.cli.nc_options import Program, ProgramOptions
+from rds.cli.option_groups import grouped_options
 
 _HELP = "Enter: the next line; a number: go on to that line; a: all; q: quit"
 
 
+@grouped_options
 def step(
     file: Program,
-    tools: Tools = None,
-    parameters: Parameters = None,
-    with_: With = None,
-    max_jumps: MaxJumps = None,
+    reading: ProgramOptions,
     most: Annotated[int, typer.Option(min=1, help="Lines that are executed at most.")] = 10000,
     json: Json = False,
 ) -> None:
@@ -32,7 +31,7 @@ def step(
     with refusals(), until_nobody_reads():
         from rds.nc.stepping import steps
 
-        what = setup(tools, parameters, with_, max_jumps)
+        what = reading.setup()
         found = islice(
             steps(file, tools=what.tool_list(), parameters=what.parameters, options=what.options),
             most,

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli import cluster_options
 from rds.cli.buses import Channel, Experiment, Interface, bus_table_of
+from rds.cli.cluster_options import ClusterOptions
 from rds.cli.common import Json, print_json, refusals, stdout_kept, writes_files
 
 app = typer.Typer(no_args_is_help=True, help="Delay in loops over a network: measured, and what it costs.")
@@ -102,6 +102,7 @@ def clocks(
 @app.command()
 @writes_files
 def sweep(
+    *,
     nodes: Annotated[str, typer.Option(help="Nodes of the plant.")] = "100,1000,10000,100000",
     per_segment: Annotated[str, typer.Option(help="Nodes on a segment, 1 to 95.")] = "10,40",
     bitrate: Annotated[str, typer.Option(help="Of the segments, bit/s.")] = "500000,1000000",
@@ -110,11 +111,7 @@ def sweep(
     handling: Annotated[float, typer.Option(help="What the host takes for a frame, s.")] = 5e-6,
     limit: Annotated[float, typer.Option(help="Error of a clock that the plant can bear, s.")] = 50e-6,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Local processes; default: all.")] = None,
-    scheduler: cluster_options.Address = None,
-    tls_ca: cluster_options.Ca = None,
-    tls_cert: cluster_options.Cert = None,
-    tls_key: cluster_options.Key = None,
-    insecure_cluster: cluster_options.Insecure = False,
+    on_cluster: ClusterOptions,
     plot: Annotated[Path | None, typer.Option(help="Write a picture as a PNG.")] = None,
     json: Json = False,
 ) -> None:
@@ -123,7 +120,7 @@ def sweep(
         from rds.network.loops.plant import PARTS, most_nodes
         from rds.network.loops.plant import sweep as swept
 
-        cluster = cluster_options.scheduler_of(scheduler, tls_ca, tls_cert, tls_key, insecure_cluster)
+        cluster = on_cluster.chosen()
         found = list(
             swept(
                 _numbers(nodes, "--nodes"),

@@ -7,24 +7,21 @@ from typing import Annotated
 
 import typer
 
-from rds.cli import cluster_options
+from rds.cli.cluster_options import ClusterOptions
 from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 
 
 @writes_files
 def robustness(
     experiment: Annotated[Path, typer.Argument(help="The experiment, a TOML file.")],
+    *,
     runs: Annotated[int, typer.Option("--runs", "-n", help="How many draws.")] = 1000,
     seed: Annotated[int, typer.Option(help="Of the draws: the same seed gives the same ones.")] = 0,
     model: Annotated[Path | None, typer.Option(help="A model file instead of the experiment's \\[model].")] = None,
     ranges: Annotated[Path | None, typer.Option(help="TOML of \\[AXIS] tables: PARAMETER = \\[low, high].")] = None,
     level: Annotated[float, typer.Option(help="Of the confidence region that is drawn from.")] = 0.95,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Local processes; default: all.")] = None,
-    scheduler: cluster_options.Address = None,
-    tls_ca: cluster_options.Ca = None,
-    tls_cert: cluster_options.Cert = None,
-    tls_key: cluster_options.Key = None,
-    insecure_cluster: cluster_options.Insecure = False,
+    on_cluster: ClusterOptions,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for a page, pictures and draws.csv.")] = None,
     json: Json = False,
 ) -> None:
@@ -37,7 +34,7 @@ def robustness(
         from rds.identification.robustness.study import study
         from rds.identification.robustness.summary import to_json
 
-        cluster = cluster_options.scheduler_of(scheduler, tls_ca, tls_cert, tls_key, insecure_cluster)
+        cluster = on_cluster.chosen()
         with progress_bars() as bar:
             found = study(
                 experiment,

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli.buses import Baud, Bitrate, Channel, Experiment, Interface, chosen_bus, refuse_baud
+from rds.cli.buses import Baud, BusOptions, refuse_baud
 from rds.cli.common import Json, print_json, refusals, until_ctrl_c, writes_files
 
 _INTERVAL = 0.1  # s between two looks; what is gone is noticed at the third
@@ -17,6 +17,7 @@ _INTERVAL = 0.1  # s between two looks; what is gone is noticed at the third
 
 @writes_files
 def scan(
+    *,
     watching: Annotated[
         bool, typer.Option("--watch", help="Go on, and say which distributed modules come and go, until Ctrl-C.")
     ] = False,
@@ -29,11 +30,8 @@ def scan(
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="With --watch: end after so long.")] = None,
     force: Annotated[bool, typer.Option("--force", help="With --events: overwrite the file.")] = False,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
+    on_bus: BusOptions,
     baud: Baud = None,
-    experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """List the modules on a bus: number, type, dialect, version, state. Numbers used twice are refused.
@@ -46,7 +44,7 @@ def scan(
         _check_watch(watching, events=events, modules=modules, seconds=seconds, force=force or None)
         if force and events is None:
             raise InputError("--force overwrites the file of --events, which is not given")
-        place = chosen_bus(interface, channel, experiment, bitrate)
+        place = on_bus.chosen()
         refuse_baud(place, baud)
         if watching:
             if place.is_line:

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 from rds.core.errors import InputError
 from rds.core.quantities import Quantity
 from rds.core.shared_quantities import SAMPLE_PERIOD
-
-SPINDLE_UNIT = "rev/min"
+from rds.core.types import SPINDLE_UNIT
 
 
 class AxisData(NamedTuple):

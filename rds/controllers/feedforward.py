@@ -22,11 +22,10 @@ from math import expm1
 from typing import Any
 
 from rds.controllers import tracking
-from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.core.quantities import Declaration, Quantity
-from rds.core.types import Controller, Reference, Source
+from rds.core.types import SPINDLE_UNIT, Controller, Reference, Source
 
 NAME = "feedforward"
 SPINDLE = False

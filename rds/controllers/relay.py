@@ -26,13 +26,12 @@ from math import exp, inf, isfinite, pi, sin, sqrt
 from typing import Any, NamedTuple
 
 from rds.controllers import pid
-from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.controllers.pid_options import BIAS, GAINS
 from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.core.quantities import Choice, Declaration, Quantity, checked
 from rds.core.shared_quantities import SAMPLE_PERIOD
-from rds.core.types import Controller, Reference, Source
+from rds.core.types import SPINDLE_UNIT, Controller, Reference, Source
 
 NAME = "relay"
 RULES = {  # Pgain / Ku, Ti / Tu, Td / Tu

@@ -13,10 +13,10 @@ from functools import partial
 from math import exp
 from typing import Any
 
-from rds.controllers.axis_data import SPINDLE_UNIT, AxisData, axis_data
+from rds.controllers.axis_data import AxisData, axis_data
 from rds.core.errors import InputError
 from rds.core.quantities import Quantity
-from rds.core.types import Controller, Reference, Source
+from rds.core.types import SPINDLE_UNIT, Controller, Reference, Source
 
 POLE = Quantity("of a spindle: closed-loop pole of its speed, left of 0, such as -32", "1/s")
 SPEED_POLE = -32.0  # 1/s: the speed settles in 0.125 s, as the paper's axes do

@@ -14,11 +14,11 @@ from functools import partial
 from typing import Any
 
 from rds.controllers import observer, speed_tracking
-from rds.controllers.axis_data import SPINDLE_UNIT, AxisData, axis_data
+from rds.controllers.axis_data import AxisData, axis_data
 from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.core.quantities import AnyValue, Declaration, Items, Quantity
-from rds.core.types import Controller, Reference, Source
+from rds.core.types import SPINDLE_UNIT, Controller, Reference, Source
 
 NAME = "tracking"
 _REAL = Quantity("real pole", "1/s")

@@ -28,15 +28,15 @@ def toml_text(table: Mapping[str, Any], comment: str = "") -> str:
 def _lines(table: Mapping[str, Any], name: tuple[str, ...]) -> list[str]:
     tables = {key: value for key, value in table.items() if isinstance(value, Mapping)}
     lists = {key: value for key, value in table.items() if _is_tables(value)}
-    lines = [f"{_key(key)} = {_value(v)}" for key, v in table.items() if key not in tables and key not in lists]
+    lines = [f"{toml_key(key)} = {toml_value(v)}" for key, v in table.items() if key not in tables and key not in lists]
     if name and (lines or not (tables or lists)):
-        lines.insert(0, f"[{'.'.join(map(_key, name))}]")
+        lines.insert(0, f"[{'.'.join(map(toml_key, name))}]")
     for key, inner in tables.items():
         lines += ["", *_lines(inner, (*name, key))] if lines else _lines(inner, (*name, key))
     for key, items in lists.items():
         for item in items:
-            flat = [f"{_key(word)} = {_value(value)}" for word, value in item.items()]
-            lines += ["", f"[[{'.'.join(map(_key, (*name, key)))}]]", *flat]
+            flat = [f"{toml_key(word)} = {toml_value(value)}" for word, value in item.items()]
+            lines += ["", f"[[{'.'.join(map(toml_key, (*name, key)))}]]", *flat]
     return lines
 
 
@@ -44,11 +44,13 @@ def _is_tables(value: Any) -> bool:
     return isinstance(value, list | tuple) and bool(value) and all(isinstance(item, Mapping) for item in value)
 
 
-def _key(key: str) -> str:
+def toml_key(key: str) -> str:
+    """A key as TOML has it, in quotes where it must be."""
     return key if _BARE.fullmatch(key) else _text(key)
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """A value as TOML has it; see `toml_text`."""
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, bool):
@@ -58,9 +60,9 @@ def _value(value: Any) -> str:
     if isinstance(value, Real):
         return _float(float(value))
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_key(key)} = {_value(inner)}" for key, inner in value.items()) + "}"
+        return "{" + ", ".join(f"{toml_key(key)} = {toml_value(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, Sequence):
-        items = [_value(item) for item in value]
+        items = [toml_value(item) for item in value]
         if sum(map(len, items)) > 100:
             return "[\n" + "".join(f"    {item},\n" for item in items) + "]"
         return f"[{', '.join(items)}]"

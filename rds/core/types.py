@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 from rds.core.quantities import Quantity, listed
 
+SPINDLE_UNIT = "rev/min"  # of an axis whose speed is what is measured and commanded
+
 
 class Reference(NamedTuple):
     """What the axis should do at one sample; arrays in axis order for a controller of several axes."""

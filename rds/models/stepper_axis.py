@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import asin, ceil, copysign, pi
+from math import ceil, copysign
 
 from rds.core.errors import InputError
 from rds.core.options import check_known
@@ -94,18 +94,6 @@ class StepperParameters:
         need = self.friction + (self.weight if forward else -self.weight)
         share = min(max(need, 0.0) / self.torque, 1.0)
         return self.no_torque - share * (self.no_torque - self.corner)
-
-    def deflection(self, step: float, load: float) -> float:
-        """How far (mm) a load (force over inertia, mm/s²) holds the carriage off its step of `step` mm, without loss.
-
-        The torque goes as the sine of the angle between rotor and field, which has a period of four steps. InputError
-        for a load that the motor does not bear.
-        """
-        if not abs(load) <= self.torque:
-            raise InputError(
-                f"a load of {load:g} mm/s² is more than the torque of {self.torque:g} mm/s²: steps are lost"
-            )
-        return 0.5 * SLIPS * step / pi * asin(load / self.torque)
 
 
 class StepperAxis:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,11 @@ METRIC_TITLES = {
     "rms_error": "RMS error",
     "fit_percent": "fit",
 }
+
+
+def image(png: bytes, text: str) -> str:
+    """A picture within the page, with a text for who does not see it."""
+    return f'<img alt="{escape(text)}" src="data:image/png;base64,{b64encode(png).decode("ascii")}">'
 
 
 def number(value: Any) -> str:
@@ -124,9 +130,9 @@ def all_notes(result: Result) -> list[str]:
     return [*map(str, result.meta.get("notes") or []), *metric_notes(result)]
 
 
-def key_values(values: Mapping[str, Any], title: str = "") -> str:
+def key_values(values: Mapping[str, Any]) -> str:
     """A mapping as a table of two columns; nested mappings as `a.b`."""
-    return table(["", ""], [[key, value] for key, value in flat(values)], title) if values else ""
+    return table(["", ""], [[key, value] for key, value in flat(values)]) if values else ""
 
 
 def flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:

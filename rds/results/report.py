@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -172,11 +171,11 @@ def _together(results: Sequence[Result], labels: Sequence[str]) -> str:
         return ""
     from rds.results.plots_overlay import modes
 
-    return f"<section><h2>All runs over each other</h2>{_image(modes(results, labels).png(), 'all runs')}</section>"
+    return f"<section><h2>All runs over each other</h2>{html.image(modes(results, labels).png(), 'all runs')}</section>"
 
 
 def _run_section(result: Result, label: str, pictures: Mapping[str, bytes]) -> str:
-    shown = "".join(_image(png, f"{label}: {title}") for title, png in pictures.items())
+    shown = "".join(html.image(png, f"{label}: {title}") for title, png in pictures.items())
     return (
         f"<section><h2>{escape(label.capitalize())}</h2>{shown}"
         f"{_environment(result)}{_timing(result)}{_details('Controller', result.meta.get('controller'))}"
@@ -209,11 +208,6 @@ def _details(title: str, values: Any) -> str:
         return ""
     shown = html.key_values(values) if isinstance(values, Mapping) else f"<p>{escape(html.number(values))}</p>"
     return f"<details><summary>{escape(title)}</summary>{shown}</details>"
-
-
-def _image(picture: bytes, text: str) -> str:
-    data = b64encode(picture).decode("ascii")
-    return f'<img alt="{escape(text)}" src="data:image/png;base64,{data}">'
 
 
 def _link(report: Path, file: str | Path) -> str:

@@ -15,8 +15,7 @@ import pytest
 
 from rds.core.errors import MachineError
 from rds.panels.app.whereabouts import ask, own_line
-from rds.panels.page.rescue import Rescue
-from rds.panels.page.shell import Shell
+from rds.panels.page.shell import Rescue, Shell
 from rds.panels.session import Session
 from tests.panels.conftest import App, begin_with
 from tests.panels.test_interrupted import wait_for

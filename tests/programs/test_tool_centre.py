@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rds.cli.nc_options import setup
+from rds.cli.nc_options import ProgramOptions
 from rds.core.errors import InputError
 from rds.interpolators.motion.segments import AXES, JOINTS
 from rds.machines import Machine, load_machine
@@ -307,7 +307,7 @@ def test_an_operator_sees_the_tip_and_its_feed(tmp_path: Path) -> None:
         "G1 X10 Y0 Z20 A10 C60 F60\nG49\nG0 X0 Y0 Z0\nM2\n"
     )
     (tmp_path / "tool.tbl").write_text("T1 P1 Z5 D2\n")
-    tools = setup(tmp_path / "tool.tbl", None, None, None)
+    tools = ProgramOptions(tmp_path / "tool.tbl").setup()
     part = PartProgram(tmp_path / "part.ngc", "xyzac", setup=tools)
     result = part.run()
     line = result["program_line"].astype(int)

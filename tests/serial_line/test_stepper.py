@@ -58,10 +58,3 @@ def test_steps_that_come_while_others_are_made_are_not_lost() -> None:
 def test_a_motor_that_never_moves_is_refused() -> None:
     with pytest.raises(InputError, match="must be above friction and weight together"):
         StepperParameters(K=1.0, torque=100.0, corner=1.0, no_torque=2.0, friction=90.0, weight=20.0)
-
-
-def test_a_load_holds_the_carriage_off_by_one_step_at_most() -> None:
-    assert X.deflection(0.01, 1200.0) == pytest.approx(0.01 / 3)
-    assert X.deflection(0.01, -2400.0) == pytest.approx(-0.01)
-    with pytest.raises(InputError, match="steps are lost"):
-        X.deflection(0.01, 2401.0)

@@ -17,8 +17,9 @@ import time
 from rds.bus.hub import wire
 from rds.bus.hub.address import Address
 from rds.bus.hub.hub_node import Node, State
-from rds.bus.hub.hub_nodes import SECOND, HubNodes, log
+from rds.bus.hub.hub_nodes import HubNodes, log
 from rds.bus.hub.poller import HANGUP, WRITE
+from rds.bus.medium.bits import SECOND
 
 # 65,536 frames: 13 s of a control loop with five frames per millisecond, and 5 s with thirteen. So a monitor that
 # stands still never holds up such a loop: it is let go in the moment in which its queue is full.

@@ -13,10 +13,10 @@ from rds.bus.hub.error_states import SEATS, Board
 from rds.bus.hub.hub_node import Node, State
 from rds.bus.hub.hub_requests import Requests
 from rds.bus.hub.poller import READ, WRITE, make_poller
+from rds.bus.medium.bits import SECOND
 from rds.bus.medium.medium import Medium, UntimedMedium
 from rds.bus.medium.station import Station
 
-SECOND = 1_000_000_000  # ns
 STRANGERS = 64  # connections that have not said who they are, where anybody may connect
 
 

@@ -31,7 +31,7 @@ SUSPEND = 8  # bits that an error-passive sender waits beyond the interframe spa
 SHORTEST_ERROR = ERROR_FLAG + ERROR_DELIMITER + INTERFRAME  # 17 bits until the bus is free again
 LONGEST_ERROR = SHORTEST_ERROR + 6 + SUSPEND  # 31
 
-_SECOND = 1_000_000_000  # ns
+SECOND = 1_000_000_000  # ns
 _STANDARD, _EXTENDED = 0x7FF, 0x1FFFFFFF
 _DLC = {size: dlc for dlc, size in enumerate(FD_SIZES)}
 
@@ -51,8 +51,8 @@ class Bits(NamedTuple):
         """Duration in ns, rounded up; rates in bit/s. `data_bitrate` None: the same rate."""
         nominal = self.nominal + (INTERFRAME if interframe else 0)
         if not self.fast or data_bitrate is None:
-            return -(-(nominal + self.fast) * _SECOND // bitrate)
-        return -(-(nominal * data_bitrate + self.fast * bitrate) * _SECOND // (bitrate * data_bitrate))
+            return -(-(nominal + self.fast) * SECOND // bitrate)
+        return -(-(nominal * data_bitrate + self.fast * bitrate) * SECOND // (bitrate * data_bitrate))
 
 
 def frame_bits(

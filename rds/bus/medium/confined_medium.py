@@ -8,15 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Generic, NamedTuple
 
-from rds.bus.medium.bits import SUSPEND
+from rds.bus.medium.bits import SECOND, SUSPEND
 from rds.bus.medium.confinement import SEQUENCE, ErrorState
 from rds.bus.medium.error_reports import DISTURBED, RESTARTED, report, state_report
 from rds.bus.medium.fault_kinds import Fault
 from rds.bus.medium.medium import Delivery, FaultRefused, Medium, Node
 from rds.bus.medium.recovery import Recovery
 from rds.bus.medium.station import Frame, Station
-
-_SECOND = 1_000_000_000  # ns
 
 
 class Flight(NamedTuple, Generic[Node]):
@@ -50,7 +48,7 @@ class ConfinedMedium(Medium[Node]):
 
     def bit_time(self, bits: int) -> int:
         """The time of so many bits, rounded up."""
-        return -(-bits * _SECOND // self.bitrate)
+        return -(-bits * SECOND // self.bitrate)
 
     def _is_passive(self, node: Node) -> bool:
         return self.stations[node].counters.state is ErrorState.PASSIVE

@@ -5,9 +5,8 @@ from __future__ import annotations
 import random
 
 from rds.bus.hub import wire
+from rds.bus.medium.bits import SECOND
 from rds.bus.medium.fault_kinds import ENDLESS, Fault
-
-_SECOND = 1_000_000_000  # ns
 
 
 class _Armed:
@@ -18,7 +17,7 @@ class _Armed:
     def __init__(self, fault: Fault, now: int, owner: object):
         self.fault = fault
         self.owner = owner
-        self.until = ENDLESS if fault.duration is None else now + round(fault.duration * _SECOND)
+        self.until = ENDLESS if fault.duration is None else now + round(fault.duration * SECOND)
         self.left = fault.count if fault.count is not None else (1 if fault.duration is None else ENDLESS)
         self.chance = None if fault.seed is None else random.Random(fault.seed)
 
@@ -54,7 +53,7 @@ class FrameFaults:
     def delay(self, sender: str, record: bytes, now: int) -> int:
         """How long the frame that `sender` (a name) offers is to wait, ns; 0: not."""
         fault = self._first(True, sender, record, now) if self._armed else None
-        return 0 if fault is None else round((fault.by or 0.0) * _SECOND)
+        return 0 if fault is None else round((fault.by or 0.0) * SECOND)
 
     def strike(self, sender: str, record: bytes, now: int) -> Fault | None:
         """What befalls the frame that goes over the bus now: to lose, corrupt or duplicate it."""

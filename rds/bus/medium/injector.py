@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Generic
 
+from rds.bus.medium.bits import SECOND
 from rds.bus.medium.fault_kinds import FRAME_KINDS, KINDS, Fault
 from rds.bus.medium.medium import FaultRefused, Medium, Node
-
-_SECOND = 1_000_000_000  # ns
 
 
 class Injector(Generic[Node]):
@@ -40,7 +39,7 @@ class Injector(Generic[Node]):
             if fault.at == 0:
                 self._begin(fault, owner, now)
             else:
-                self._medium.at(now + round(fault.at * _SECOND), partial(self._begin_later, fault, owner))
+                self._medium.at(now + round(fault.at * SECOND), partial(self._begin_later, fault, owner))
 
     def withdraw(self, owner: object, now: int) -> None:
         """End what `owner` has injected; None: all. Who is dead stays dead."""
@@ -106,7 +105,7 @@ class Injector(Generic[Node]):
                     del self._lifts[key]
                     safely(time)
 
-            self._medium.at(now + round(fault.duration * _SECOND), over)
+            self._medium.at(now + round(fault.duration * SECOND), over)
 
     def _check_names(self, fault: Fault) -> None:
         for name in (fault.node, fault.receiver):

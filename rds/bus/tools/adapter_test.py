@@ -19,6 +19,7 @@ import can
 import numpy as np
 
 from rds.bus.medium import error_reports
+from rds.bus.modules.cia402.codes import NODES
 from rds.bus.modules.rds import frames
 from rds.bus.tools.statistics import BITRATE, Statistics
 from rds.core.progress import Progress
@@ -33,7 +34,6 @@ _QUESTION_BITS = 2 * 135  # of question and answer at most, 8 bytes each
 _SHARE = 0.8  # of the bus that a cycle may take
 _HEAVY = 0.05  # of the frames disturbed: not single disturbances any more
 _SERIAL = Path("/sys/bus/usb-serial/devices")
-_NODES = range(1, 128)
 
 
 @dataclass(frozen=True)
@@ -254,7 +254,7 @@ def _find(bus: can.BusABC, errors: Counter[str]) -> tuple[Answerer | None, bool,
     sdo = b"\x40\x00\x10\x00" + bytes(4)
     answerers = [
         Answerer(f"the CANopen device with node-ID {node}", (0x600 + node, sdo), 0x580 + node, sdo[1:4])
-        for node in _NODES
+        for node in NODES
     ]
     modules = [
         Answerer(f"module {node}", (frames.CALL, b""), frames.answer_identifier(node), b"") for node in frames.NODES

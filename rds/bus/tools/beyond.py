@@ -7,7 +7,6 @@ a cable.
 from __future__ import annotations
 
 import contextlib
-import ipaddress
 from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlsplit
@@ -15,20 +14,11 @@ from urllib.parse import urlsplit
 import can
 
 from rds.core.errors import InputError
+from rds.core.loopback import is_loopback
 
 OPTION = "beyond_this_computer"  # the words in [bus] that allow it
 _MULTICAST = ("udp_multicast",)  # interfaces that speak to a whole network, whatever their channel is
 _HOSTS = ("host", "hostname", "ip", "ip_address", "address", "server")  # options that name another computer
-
-
-def is_loopback(host: str) -> bool:
-    """Whether a host's name or address is this computer's own loopback."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def refuse_network(interface: str, channel: Any, options: Mapping[str, Any], allowed: Any) -> None:

@@ -17,6 +17,7 @@ from functools import cache
 import can
 
 from rds.bus.modules import dialects
+from rds.bus.modules.cia402.codes import NODES
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.frames import Kind
 from rds.bus.tools.link import bus_failed
@@ -28,7 +29,6 @@ UNUSED = range(0x780, 0x800)  # above all that machines send
 _STANDARD = range(0x800)
 _DEVICE_TYPE = b"\x40\x00\x10\x00" + bytes(4)  # SDO: what are you? Read only
 _REQUEST, _ANSWER, _HEARTBEAT = 0x600, 0x580, 0x700
-_DRIVES = range(1, 128)
 _SEND = 0.5  # s
 _MOST_WAITING = 1000  # frames taken at once by one who is in a hurry
 
@@ -74,7 +74,7 @@ def live_modules(bus: can.BusABC, listen: float = LISTEN) -> list[str]:
     found: set[tuple[str, int]] = set()
     try:
         bus.send(_frame(frames.CALL, b""), listen)
-        for node in _DRIVES:
+        for node in NODES:
             bus.send(_frame(_REQUEST + node, _DEVICE_TYPE), _SEND)
         for message in frames_within(bus, listen):
             found |= _senders(message)
@@ -112,9 +112,9 @@ def _senders(message: can.Message) -> set[tuple[str, int]]:
         return set()
     if identifier - frames.ANSWER in frames.NODES and len(data) == 8 and data[5] <= max(Kind):
         return {("module", identifier - frames.ANSWER)}
-    if identifier - _HEARTBEAT in _DRIVES and len(data) == 1:
+    if identifier - _HEARTBEAT in NODES and len(data) == 1:
         return {("drive", identifier - _HEARTBEAT)}
-    if identifier - _ANSWER in _DRIVES and len(data) == 8 and bytes(data[1:4]) == _DEVICE_TYPE[1:4]:
+    if identifier - _ANSWER in NODES and len(data) == 8 and bytes(data[1:4]) == _DEVICE_TYPE[1:4]:
         return {("drive", identifier - _ANSWER)}
     return set()
 

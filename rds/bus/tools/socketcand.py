@@ -36,10 +36,10 @@ from typing import Any
 import can
 
 from rds.bus.tools import socketcand_words as words
-from rds.bus.tools.beyond import is_loopback
 from rds.bus.tools.live_machine import acts_on_machine
 from rds.bus.tools.receiver import Fault, Receiver
 from rds.core.errors import InputError
+from rds.core.loopback import is_loopback
 
 LOG = logging.getLogger(__name__)
 

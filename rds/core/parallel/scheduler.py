@@ -6,7 +6,6 @@ With TLS both sides show a certificate of one authority of their own. Plain TCP 
 
 from __future__ import annotations
 
-import ipaddress
 import re
 import warnings
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.loopback import is_loopback
 
 _HELP = "see 'On several computers' in docs/submissions.md"
 _ADDRESS = re.compile(r"(?:(?P<protocol>[a-z]+)://)?(?P<host>\[[0-9a-fA-F:.%]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})")
@@ -61,7 +61,7 @@ class Scheduler:
                     f"scheduler {self!r} is plain TCP, which takes no certificates ({', '.join(given)} given); start "
                     f"it with TLS and give tls://..., {_HELP}"
                 )
-            if not _is_loopback(host) and not self.insecure:
+            if not is_loopback(host) and not self.insecure:
                 raise InputError(
                     f"scheduler {self!r} is plain TCP: whoever reaches or imitates it runs code as you, here and on "
                     f"its workers. Start scheduler and workers with TLS and give tls://... ({_HELP}), or, on a network "
@@ -77,7 +77,7 @@ class Scheduler:
         protocol, host = self._parts()
         if protocol == "tls":
             return ""
-        who = "every user of this computer" if _is_loopback(host) else "whoever reaches it over the network"
+        who = "every user of this computer" if is_loopback(host) else "whoever reaches it over the network"
         return f"scheduler {self!r} is plain TCP: {who} can run code as its users; tls:// keeps others out, {_HELP}"
 
     def security(self) -> Any:
@@ -113,16 +113,6 @@ class Scheduler:
                 "tls://192.168.0.10:8786, or tcp://127.0.0.1:PORT on this computer"
             )
         return protocol, found["host"].strip("[]")
-
-
-def _is_loopback(host: str) -> bool:
-    """Whether it is this computer by its address; a name but localhost is not looked up."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def refused(error: BaseException) -> str | None:

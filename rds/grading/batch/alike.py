@@ -20,8 +20,9 @@ from rds.core.parallel import spread
 from rds.core.parallel.reader_process import confine
 from rds.core.parallel.scheduler import Scheduler
 from rds.grading.assignment.assignment import Assignment
-from rds.grading.batch.finished import CODE
+from rds.grading.batch.finished import CODE, STUDENTS
 from rds.grading.batch.queue import MEMORY, Queued, queued
+from rds.grading.batch.record import FILE as RECORD
 from rds.grading.batch.similarity import (
     Fingerprints,
     Identical,
@@ -38,7 +39,6 @@ from rds.grading.grade import AS_SOLUTION, BEHAVIOUR
 from rds.grading.intake import collect
 
 _PATIENCE = 600.0  # s for one file
-_RECORD, _STUDENTS = "batch.json", "students"
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ def earlier_files(assignment: Assignment, places: Sequence[Path]) -> dict[str, S
     called = [place.resolve().name for place in places]
     for place, name in zip(places, called, strict=True):
         whose = name if called.count(name) == 1 else str(place)
-        if (place / _RECORD).is_file():
-            codes = sorted((place / _STUDENTS).glob(f"*/{CODE}"))
+        if (place / RECORD).is_file():
+            codes = sorted((place / STUDENTS).glob(f"*/{CODE}"))
             files = {path.parent.name: spool.put(path.read_bytes()) for path in codes}
         else:
             intake = collect(place, assignment.files, (assignment.title, assignment.folder.resolve().name))

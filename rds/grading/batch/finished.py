@@ -11,6 +11,7 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.grading.assignment.late_rules import LateRules
+from rds.grading.batch.record import FILE as RECORD
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.course.class_list import ClassList, read_class_list
 from rds.grading.grade import Grade, Status
@@ -18,7 +19,7 @@ from rds.grading.intake.names import safe_id
 from rds.grading.review.entries import Review, read_review
 from rds.grading.review.everyone import everyone
 
-RECORD, STUDENTS, GRADE, FEEDBACK = "batch.json", "students", "grade.json", "feedback.html"
+STUDENTS, GRADE, FEEDBACK = "students", "grade.json", "feedback.html"
 CODE, COLUMNS = "submission.py", "columns.parquet"  # what a submission is called in messages to its author, too
 
 

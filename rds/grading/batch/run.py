@@ -283,7 +283,7 @@ class _Batch:
         told = grade.to_json()
         files["grade.json"] = json.dumps(told, indent=1, allow_nan=False).encode() + b"\n"
         folder = each.folder
-        write_files({folder / name: partial(_write, data) for name, data in files.items()})
+        write_files({folder / name: data for name, data in files.items()})
         self._journal.append({"student": each.row.student, "grade": told, "seconds": seconds})
         self._done[each.row.student] = _Done.of(told)
 
@@ -301,7 +301,3 @@ def _answer(outcome: Outcome) -> Answer | None:
     if answer.missing:
         raise InputError(f"a worker cannot grade: {answer.missing}. What is graded is kept; go on with --resume")
     return answer
-
-
-def _write(data: bytes, stream: Any) -> None:
-    stream.write(data)

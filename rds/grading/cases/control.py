@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
-from rds.core.types import Controller, Model
+from rds.core.types import SPINDLE_UNIT, Controller, Model
 from rds.grading.assignment.seeds import part_seed
 from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
 from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts

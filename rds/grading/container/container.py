@@ -25,9 +25,9 @@ from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.core.installed import DISTRIBUTION
 from rds.core.private_files import make_folder
+from rds.grading.batch.record import FILE as RECORD
 
 PROGRAMS = ("docker", "podman")
-RECORD = "batch.json"
 _PACKAGE = Path(__file__).resolve().parents[2]
 _OPENED = ("--security-opt", "seccomp=unconfined", "--security-opt", "apparmor=unconfined")
 _WHOLE_PROC = {"docker": ("--security-opt", "systempaths=unconfined"), "podman": ("--security-opt", "unmask=ALL")}

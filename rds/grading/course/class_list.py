@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import csv
 import io
-import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -19,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.grading.table_text import rows_by_heading
+from rds.grading.intake.names import compared, letters
+from rds.grading.table_text import read_table, rows_by_heading
 
 FILE = "class.csv"
 COLUMNS = ("student", "name", "email", "section", "group", "extension_days", "late_days")
@@ -70,18 +70,18 @@ class ClassList:
         keys = ("sid", "email") if about.get("platform") == "moodle" else ("sid", "id", "email")
         said = [student, *(str(about[key]) for key in keys if about.get(key))]
         found = self._one(said, lambda each: each.student) or self._one(said, lambda each: each.email)
-        by_name = (self._one([_letters(name)], lambda each: _letters(each.name)) for name in _names(student, about))
+        by_name = (self._one([letters(name)], lambda each: letters(each.name)) for name in _names(student, about))
         return found or next(filter(None, by_name), None)
 
     def namesakes(self, student: str, source: Mapping[str, Any]) -> list[Member]:
         """Several of one name, of whom it may be any who handed in as `student`; none where `find` knows."""
-        names = {_letters(name) for name in _names(student, source)}
-        found = [each for each in self.members if each.name and _letters(each.name) in names]
+        names = {letters(name) for name in _names(student, source)}
+        found = [each for each in self.members if each.name and letters(each.name) in names]
         return found if len(found) > 1 and self.find(student, source) is None else []
 
     def _one(self, said: Iterable[str], of: Callable[[Member], str]) -> Member | None:
-        wanted = {_compared(text) for text in said if text}
-        found = [each for each in self.members if of(each) and _compared(of(each)) in wanted]
+        wanted = {compared(text) for text in said if text}
+        found = [each for each in self.members if of(each) and compared(of(each)) in wanted]
         return found[0] if len(found) == 1 else None
 
     def to_csv(self) -> bytes:
@@ -110,15 +110,7 @@ class ClassList:
 
 def read_class_list(path: Path) -> ClassList:
     """The table at `path`. InputError with its line for a column, a number or a student that will not do."""
-    try:
-        if path.stat().st_size > _LARGEST:
-            raise InputError(f"has more than {_LARGEST} bytes; name a table of students", str(path))
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}; name the class list", str(path)) from error
-    except UnicodeDecodeError as error:
-        raise InputError("is no text in UTF-8; save it as CSV UTF-8", str(path)) from error
-    reader = rows_by_heading(text, str(path))
+    reader = rows_by_heading(read_table(path, _LARGEST, "students", "class list"), str(path))
     columns = [name.strip() for name in reader.fieldnames or ()]
     if "student" not in columns or len(set(columns)) < len(columns) or not set(columns) <= set(COLUMNS):
         raise InputError(
@@ -176,12 +168,3 @@ def _names(student: str, about: Mapping[str, Any]) -> list[str]:
     name = str(about.get("name") or student)
     parts = name.split("-") if about.get("platform") == "moodle" else [name]
     return ["-".join(parts[at:]) for at in range(len(parts))]
-
-
-def _letters(name: str) -> str:
-    return "".join(each for each in _compared(name) if each.isalnum())
-
-
-def _compared(text: str) -> str:
-    """Without capitals, and with accents in the letters: a Mac keeps them apart in the names of files."""
-    return unicodedata.normalize("NFC", text).strip().casefold()

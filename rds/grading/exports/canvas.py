@@ -11,7 +11,8 @@ import re
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source, unknown
+from rds.grading.exports.roster import Key, Sheet, find, platform, read_sheet, source, unknown
+from rds.grading.intake.names import letters
 
 FILE = "canvas.csv"
 USES = ("gradebook", "column", "points")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from rds.core.atomic import write_files
 from rds.core.errors import InputError
@@ -47,7 +46,7 @@ def export(out: Path, to: str, file: Path | None, wanted: ExportOptions) -> Writ
         raise InputError("-o has no meaning where a database is changed; leave it out", str(file))
     place = Path(str(wanted.gradebook)) if not made.files else file or out / module.FILE
     paths = _paths(place, made.files)
-    write_files({path: partial(_write, data) for path, data in paths.items()})
+    write_files(paths)
     waiting = dict.fromkeys(finished.not_graded, "it has not been graded; run `rds grade run` again with --resume")
     left_out = {one_line(name): reason for name, reason in {**waiting, **made.unmatched}.items()}
     return Written(str(place), tuple(str(path) for path in paths), made.students, left_out, made.notes)
@@ -64,7 +63,3 @@ def _paths(place: Path, files: Mapping[str, bytes]) -> dict[Path, bytes]:
     if files and place.suffix and not place.is_dir():
         raise InputError("would have to be a folder: there is a file for each student", str(place))
     return {place / name: data for name, data in files.items()}
-
-
-def _write(data: bytes, stream: BinaryIO) -> None:
-    stream.write(data)

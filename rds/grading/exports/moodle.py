@@ -11,9 +11,10 @@ from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import csv_text
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source, unknown
+from rds.grading.exports.roster import Key, Sheet, find, platform, read_sheet, source, unknown
 from rds.grading.exports.said import comment
 from rds.grading.grade import Grade
+from rds.grading.intake.names import letters
 
 FILE = "moodle.csv"
 _ESCAPE = "\\"  # to Moodle's reader of CSV a quotation mark behind it ends no cell

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import unicodedata
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 from rds.core.errors import InputError
 from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import Grade
+from rds.grading.intake.names import compared
 from rds.grading.table_text import delimiter
 
 _LARGEST = 64 << 20  # bytes
@@ -114,7 +114,7 @@ def _by_cell(sheet: Sheet, key: Key) -> Mapping[str, list[int]]:
     at, table = sheet.at(key.column), {}  # type: tuple[int | None, dict[str, list[int]]]
     assert at is not None  # by `find`
     for number, row in enumerate(sheet.rows):
-        if value := _compared(key.of_row(row[at])):
+        if value := compared(key.of_row(row[at])):
             table.setdefault(value, []).append(number)
     return table
 
@@ -122,7 +122,7 @@ def _by_cell(sheet: Sheet, key: Key) -> Mapping[str, list[int]]:
 def _rows_of(grade: Grade, tables: Sequence[tuple[Key, Mapping[str, list[int]]]]) -> tuple[list[int], str]:
     for key, table in tables:
         for value in key.of_grade(grade):
-            if rows := table.get(_compared(key.of_row(value))):
+            if rows := table.get(compared(key.of_row(value))):
                 return rows, key.column
     return [], ""
 
@@ -151,13 +151,3 @@ def source(grade: Grade, *names: str) -> list[str]:
 def platform(grade: Grade, name: str, *names: str) -> list[str]:
     """As `source`, of submissions that came from the platform called `name`."""
     return source(grade, *names) if source(grade, "platform") == [name] else []
-
-
-def letters(name: str) -> str:
-    """A name without what is written differently here and there: spaces, commas, capitals."""
-    return "".join(each for each in _compared(name) if each.isalnum())
-
-
-def _compared(text: str) -> str:
-    """Without capitals, and with accents in the letters: a Mac keeps them apart in the names of files."""
-    return unicodedata.normalize("NFC", text).strip().casefold()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import unicodedata
 from collections.abc import Collection
 
 _PLAIN = re.compile(r"[a-z0-9][a-z0-9_-]{0,59}")
@@ -45,6 +46,16 @@ def without_number(name: str, accepted: Collection[str]) -> tuple[str, int]:
     """
     found = None if name in accepted else _AGAIN.fullmatch(name)
     return (name, 0) if found is None else (found["stem"] + found["end"], int(found["dash"] or found["paren"]))
+
+
+def letters(name: str) -> str:
+    """A name without what is written differently here and there: spaces, commas, capitals."""
+    return "".join(each for each in compared(name) if each.isalnum())
+
+
+def compared(text: str) -> str:
+    """Without capitals, and with accents in the letters: a Mac keeps them apart in the names of files."""
+    return unicodedata.normalize("NFC", text).strip().casefold()
 
 
 def _escaped(character: str) -> str:

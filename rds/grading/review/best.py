@@ -10,7 +10,8 @@ from pathlib import Path
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.core.private_files import make_folder, write_private
-from rds.grading.batch.finished import CODE, COLUMNS, FEEDBACK, GRADE, RECORD, STUDENTS, Finished, read_finished
+from rds.grading.batch.finished import CODE, COLUMNS, FEEDBACK, GRADE, STUDENTS, Finished, read_finished
+from rds.grading.batch.record import FILE as RECORD
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.grade import Grade, Status
 from rds.grading.intake.names import safe_id

@@ -69,8 +69,8 @@ def regrade(old: Path, assignment: Path, out: Path, how: BatchOptions) -> tuple[
     columns = ["student", "points before", "points now", "difference", "why"]
     write_files(
         {
-            out / TABLE: partial(_write, _csv([columns, *rows])),
-            out / PAGE: partial(_write, _page(read.title, before, columns, rows).encode("utf-8", "replace")),
+            out / TABLE: _csv([columns, *rows]),
+            out / PAGE: _page(read.title, before, columns, rows).encode("utf-8", "replace"),
         }
     )
     return done, changes
@@ -154,7 +154,3 @@ def _page(title: str, before: Finished, columns: list[str], rows: list[list[Any]
     body = html.table(columns, shown) if rows else "<p>Nobody's points change.</p>"
     said = f"{len(rows)} of {len(before.grades)} students change"
     return page(f"{title}: changes", f"<header><h1>{escape(one_line(title))}: {said}</h1></header>{body}")
-
-
-def _write(data: bytes, stream: Any) -> None:
-    stream.write(data)

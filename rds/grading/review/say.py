@@ -11,7 +11,7 @@ from rds.grading.feedback.plain_text import cell, csv_line, uncell
 from rds.grading.grade import with_unit
 from rds.grading.review.entries import Entry, Kind, add
 from rds.grading.review.publish import assignment_of, publish
-from rds.grading.table_text import rows_by_heading
+from rds.grading.table_text import read_table, rows_by_heading
 
 MARKS = ("student", "criterion", "points", "comment", "why")
 _LARGEST = 64 << 20  # bytes
@@ -50,15 +50,7 @@ def check(entry: Entry, finished: Finished) -> None:
 
 def read_marks(path: Path, by: str, is_final: bool = False) -> list[Entry]:
     """Entries from a table with the columns of `MARKS`; lines without points, comment and why say nothing."""
-    try:
-        if path.stat().st_size > _LARGEST:
-            raise InputError(f"has more than {_LARGEST} bytes; name a table of marks", str(path))
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}; name the table of marks", str(path)) from error
-    except UnicodeDecodeError as error:
-        raise InputError("is no text in UTF-8; save it as CSV UTF-8", str(path)) from error
-    reader = rows_by_heading(text, str(path))
+    reader = rows_by_heading(read_table(path, _LARGEST, "marks", "table of marks"), str(path))
     if not {"student", "criterion"} <= set(reader.fieldnames or ()):
         raise InputError(
             f"must have the columns {', '.join(MARKS)}; --write-marks makes such a table", f"{path}: line 1"

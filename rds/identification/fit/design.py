@@ -16,10 +16,10 @@ from rds.controllers import tracking
 from rds.core.adapt import is_control_system
 from rds.core.atomic import keep_another, write_whole
 from rds.core.errors import InputError
-from rds.core.types import Controller
+from rds.core.types import SPINDLE_UNIT, Controller
 from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.model_file import ModelFile, read_model
-from rds.identification.fit.run_model import SPINDLE_UNIT, run_model
+from rds.identification.fit.run_model import run_model
 from rds.identification.structures.signals import POSITIONS
 from rds.machines import Machine
 from rds.models.machine_model import MachineAxisMotion, linear_part

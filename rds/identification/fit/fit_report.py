@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rds.core.atomic import write_files
 from rds.identification.fit.estimate_json import correlation_rows, described, error_rows, note, parameter_rows, to_json
 from rds.identification.logs.log import named_apart
-from rds.results.html import notes_list, table
+from rds.results.html import image, notes_list, table
 from rds.results.report import page
 
 if TYPE_CHECKING:
@@ -78,11 +77,7 @@ def free_run_picture(estimate: Estimate, log: Log, structure: Structure) -> Pict
 
 def _page(estimate: Estimate, pictures: Sequence[_Drawn]) -> str:
     title = f"Fit of {described(estimate)} to {', '.join(estimate.free_run)}"
-    images = [
-        f'<section><h2>{escape(drawn.title)}</h2><img alt="{escape(drawn.shows)}" '
-        f'src="data:image/png;base64,{b64encode(drawn.png).decode("ascii")}"></section>'
-        for drawn in pictures
-    ]
+    images = [f"<section><h2>{escape(drawn.title)}</h2>{image(drawn.png, drawn.shows)}</section>" for drawn in pictures]
     return page(title, f"<header><h1>{escape(title)}</h1></header>{fragment(estimate)}{''.join(images)}")
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rds.core.errors import InputError
 from rds.core.integrate import SUBSTEPS
 from rds.core.load import StudentFile, load_student
-from rds.core.types import Model, Source
+from rds.core.types import SPINDLE_UNIT, Model, Source
 from rds.identification.fit.model_file import ModelFile, file_sha256, read_model
 from rds.identification.structures.signals import POSITIONS, VOLTS
 from rds.identification.structures.structure import Structure
@@ -23,16 +23,13 @@ from rds.models.student import student_model
 if TYPE_CHECKING:
     from rds.checks import FileReport
 
-SPINDLE_UNIT = "rev/min"
-
 
 def run_model(
     file: ModelFile,
-    values: Mapping[str, float] | None = None,
     unit: str | None = None,
     per_volt: float | None = None,
 ) -> Model:
-    """The model of a model file, exact for every option of its structure, with `values` over those of the file.
+    """The model of a model file, exact for every option of its structure.
 
     `unit` is that of the axis's position, where it is known: a spindle's model is for "rev/min", one that turns for
     "deg". `per_volt` is how many units of its command the drive makes of a volt, for a model that is commanded in
@@ -42,12 +39,11 @@ def run_model(
     if not file.is_student:
         _check_unit(file, unit)
         _check_command(file, per_volt)
-    merged = file.values() | dict(values or {})
     try:
         if file.is_student:
-            model = student_model(student_structure(file), merged, SUBSTEPS)
+            model = student_model(student_structure(file), file.values(), SUBSTEPS)
         else:
-            table = library_table(checked_structure(file), merged, per_volt or 1.0)
+            table = library_table(checked_structure(file), file.values(), per_volt or 1.0)
             model = library_model(table.pop("name"), **table)
     except InputError as error:
         raise error if error.where else InputError(str(error), file.path) from error

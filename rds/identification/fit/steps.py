@@ -43,8 +43,6 @@ class Reading:
     """
 
     at: float  # s, when the voltage changed
-    voltage_step: float  # V
-    speed_step: float  # mm/s, or rev/min
     gain: float  # speed step over voltage step
     tau: float  # s
     dead_time: float  # s
@@ -113,7 +111,7 @@ def read_step(log: Log, window: Window, is_rate: bool) -> Reading | None:
         return None
     tau = 1.5 * (t63 - t28)
     change = window.voltage - window.before
-    return Reading(float(log.time[window.first]), change, size, size / change, tau, t63 - tau, t63)
+    return Reading(float(log.time[window.first]), size / change, tau, t63 - tau, t63)
 
 
 def _smoothed_rate(log: Log, window: Window) -> tuple[np.ndarray, np.ndarray]:

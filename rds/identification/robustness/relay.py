@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from rds.controllers import library_controller
-from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.controllers.relay import NAME, SIGNALS, Tuned, tuned
 from rds.core.errors import InputError
 from rds.core.linear_law import linear_law
 from rds.core.toml_text import toml_text
+from rds.core.types import SPINDLE_UNIT
 from rds.identification.robustness.margins import grid, law_response, margins_of
 from rds.models.machine_model import linear_part
 from rds.modes import load_mode

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Mapping
 from html import escape
 from io import StringIO
@@ -92,9 +91,7 @@ def fragment(study: Study, pictures: Mapping[str, bytes] = MappingProxyType({}))
     parts = [html.notes_list([*sentences(study), *study.notes])]
     for found in summaries(study):
         images = "".join(
-            f'<img alt="{escape(name)}" src="data:image/png;base64,{b64encode(picture).decode("ascii")}">'
-            for name, picture in pictures.items()
-            if name.startswith(f"{found.axis}_")
+            html.image(picture, name) for name, picture in pictures.items() if name.startswith(f"{found.axis}_")
         )
         parts.append(
             f"<section><h2>Axis {escape(found.axis)}</h2>{html.table(COLUMNS, figure_rows(found), note=FIGURES_NOTE)}"

@@ -46,10 +46,8 @@ class CrossTestResult:
         return asdict(self)
 
 
-def cross_test(
-    candidate: Candidate, logs: Sequence[Log], settings: Mapping[str, Any] | None = None
-) -> list[CrossTestResult]:
-    """The force errors of the model on these logs; `settings` are those of inverse dynamics (cutoff, hold, ...).
+def cross_test(candidate: Candidate, logs: Sequence[Log]) -> list[CrossTestResult]:
+    """The force errors of the model on these logs.
 
     InputError for a structure whose equation is not linear, or a log that the filters cannot take.
     """
@@ -58,8 +56,8 @@ def cross_test(
     found = []
     for log in logs:
         check_units(candidate, log)
-        percent, rows = force_error(log, candidate.structure, candidate.values, settings or {})
-        own = regress_logs([log], candidate.structure, settings or {}).regression.relative_percent
+        percent, rows = force_error(log, candidate.structure, candidate.values, {})
+        own = regress_logs([log], candidate.structure, {}).regression.relative_percent
         key = (log.name, candidate.structure.name, candidate.structure.options)
         published, by = PUBLISHED.get(key, (None, ""))
         found.append(CrossTestResult(log.name, percent, own, rows, published, by))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from base64 import b64encode
 from collections.abc import Iterator, Mapping
 from html import escape
 from math import isfinite
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rds.core.atomic import write_files
 from rds.identification.validate.criterion import known
 from rds.identification.validate.verdict import Verdict, Word
-from rds.results.html import notes_list, table
+from rds.results.html import image, notes_list, table
 from rds.results.report import page
 from rds.results.units import heading
 
@@ -63,7 +62,7 @@ def _fragment(validation: Validation, drawn: Mapping[str, Mapping[str, bytes]] |
     for name, a in validation.assessments.items():
         verdict = validation.verdicts[name]
         line = verdict_line(verdict) if len(validation.assessments) > 1 else ""
-        shown = "".join(_image(picture, f"{name}: {what}") for what, picture in (drawn or {}).get(name, {}).items())
+        shown = "".join(image(picture, f"{name}: {what}") for what, picture in (drawn or {}).get(name, {}).items())
         parts.append(
             f"<section><h2>On {escape(name)}</h2>{line}{_reasons(verdict)}"
             f"{_conditions(a)}{_errors(a)}{_ahead(a)}{_rest(a)}{shown}</section>"
@@ -77,7 +76,7 @@ def _fragment(validation: Validation, drawn: Mapping[str, Mapping[str, bytes]] |
         if drawing is not None:
             parts.append(
                 "<section><h2>Parameters with 95 % intervals</h2>"
-                f"{_image(drawing.png(), 'parameters')}{_parameters(validation)}</section>"
+                f"{image(drawing.png(), 'parameters')}{_parameters(validation)}</section>"
             )
     return "".join(parts)
 
@@ -211,10 +210,6 @@ def _pictures(validation: Validation) -> dict[str, dict[str, bytes]]:
             yield "voltage errors", plots.voltage_errors(a)
 
     return {name: {what: picture.png() for what, picture in of(a)} for name, a in validation.assessments.items()}
-
-
-def _image(picture: bytes, text: str) -> str:
-    return f'<img alt="{escape(text)}" src="data:image/png;base64,{b64encode(picture).decode("ascii")}">'
 
 
 def _file_name(name: str) -> str:

@@ -7,7 +7,7 @@ from math import cos, radians, sin
 
 from rds.core.errors import InputError
 from rds.core.types import LineSegment, Segment
-from rds.nc.paths.numbers import ANGLE, COORDINATE, FEED_RATE, POSITIVE, number, point
+from rds.nc.paths.numbers import ANGLE, COORDINATE, FEED_RATE, POSITIVE, number, point, point_text
 
 Corner = Sequence[float]
 
@@ -44,7 +44,7 @@ def polyline(
     for k in range(len(corners) - 1):
         if corners[k] == corners[k + 1]:
             raise InputError(
-                f"{owner}: {called[k]} and {called[k + 1]} are the same point {_shown(corners[k])}; "
+                f"{owner}: {called[k]} and {called[k + 1]} are the same point {point_text(corners[k])}; "
                 "there is nothing to cut between them: change or leave out one"
             )
         segments.append(LineSegment(corners[k], corners[k + 1], feed))
@@ -82,7 +82,3 @@ def quadrilateral_by_moves(
         x, y, z = corners[-1]
         corners.append((x + length * cos(direction), y + length * sin(direction), z + rise))
     return quadrilateral(corners, feed_rate)
-
-
-def _shown(corner: Corner) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in corner) + ")"

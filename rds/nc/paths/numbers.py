@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rds.core.errors import InputError
@@ -45,3 +45,8 @@ def point(values: Sequence[float], name: str, owner: str, sizes: tuple[int, ...]
         number(value, f"{axis} of {name}", owner, COORDINATE) for axis, value in zip("xyz", given, strict=False)
     )
     return checked if len(checked) == 3 else (*checked, 0.0)
+
+
+def point_text(point: Iterable[float]) -> str:
+    """A point as messages show it."""
+    return "(" + ", ".join(f"{value:g}" for value in point) + ")"

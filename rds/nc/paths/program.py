@@ -10,7 +10,7 @@ from rds.core.errors import InputError
 from rds.core.geometry import sweep
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.nc.paths.measure import pieces
-from rds.nc.paths.numbers import BLEND, FARTHEST, FEED_RATE, HEIGHT, SPINDLE, number
+from rds.nc.paths.numbers import BLEND, FARTHEST, FEED_RATE, HEIGHT, SPINDLE, number, point_text
 
 # An arc's end may be off its circle by either of these (LinuxCNC, interp_internal.hh and "G2, G3 Arc Move").
 ARC_TOLERANCE = 2 * 0.01 * 2**0.5  # mm
@@ -153,8 +153,8 @@ class MoveWriter:
             return None
         if off_circle(printed) > 1.0:
             raise InputError(
-                f"program: with {self.decimals} decimals the arc to {_shown(arc.end)} is off its circle by more than "
-                f"LinuxCNC allows; take {min(self.decimals + 2, 9)} decimals"
+                f"program: with {self.decimals} decimals the arc to {point_text(arc.end)} is off its circle by more "
+                f"than LinuxCNC allows; take {min(self.decimals + 2, 9)} decimals"
             )
         return i, j
 
@@ -227,7 +227,3 @@ def written(value: float, decimals: int) -> str:
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     return "0" if text in ("-0", "") else text
-
-
-def _shown(point: Sequence[float]) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in point) + ")"

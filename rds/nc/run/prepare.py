@@ -16,6 +16,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.last_made import LastMade
 from rds.core.progress import Progress
+from rds.core.types import SPINDLE_UNIT
 from rds.interpolators.motion.certificate import Certificate
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import PASSING
@@ -33,7 +34,6 @@ from rds.nc.run.in_part import from_line, stepwise
 from rds.nc.setup import Setup
 from rds.nc.tool_centre import ToolCentre, path_of_tip
 
-SPINDLE_UNIT = "rev/min"
 MOST_SAMPLES = 20_000_000  # whose references fit into memory: five and a half hours at 1 kHz
 
 

@@ -14,6 +14,7 @@ from rds.core.errors import InputError
 from rds.core.progress import Progress
 from rds.core.quantities import Flag, Quantity, checked
 from rds.core.toml_table import TomlTable
+from rds.core.types import SPINDLE_UNIT
 from rds.interpolators.motion.segments import AXES, JOINTS
 from rds.machines import Machine, load_machine
 from rds.machines.forces.cut_file import CutFile, read_cut
@@ -29,7 +30,7 @@ from rds.modes.process.live import Live
 from rds.nc.run.forces import program_forces
 from rds.nc.run.judge import judged
 from rds.nc.run.path import WORDS, as_prepared, method_of, of_part_program
-from rds.nc.run.prepare import SPINDLE_UNIT, Prepared, prepare
+from rds.nc.run.prepare import Prepared, prepare
 from rds.nc.setup import Setup
 from rds.results import Result
 

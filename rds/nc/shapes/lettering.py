@@ -14,7 +14,7 @@ from rds.nc.shapes.svg_path import bezier
 MOST_CHARACTERS = 1000
 
 
-def text_drawing(text: str, height: float, font: Path | None = None, layer: str = "text") -> Drawing:
+def text_drawing(text: str, height: float, font: Path | None = None) -> Drawing:
     """The outlines of a text whose capitals are `height` mm high, its baseline from x = 0 along y = 0.
 
     `font`: a TrueType or OpenType file; without one DejaVu Sans, which comes with matplotlib. Lines are 1.5 times the
@@ -45,7 +45,7 @@ def text_drawing(text: str, height: float, font: Path | None = None, layer: str 
             continue
         path = TextPath((0, 0), line.replace("$", r"\$"), size=size, prop=properties, usetex=False)
         for points in _outlines(path, CHORD_ERROR / scale):
-            curve = polyline_curve(points * scale - (0.0, 1.5 * height * row), True, layer)
+            curve = polyline_curve(points * scale - (0.0, 1.5 * height * row), True, "text")
             if curve is not None and curve.closed:
                 curves.append(curve)
     return checked(Drawing(curves, f"text {text!r:.40}"))

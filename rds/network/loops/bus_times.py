@@ -29,7 +29,6 @@ class Directions:
     sensor: np.ndarray
     actuator: np.ndarray
     split_error: float
-    bus_time: np.ndarray  # s from the command on the bus to the last answer on it
 
 
 def directions(sent: np.ndarray, received: np.ndarray, frames: Sequence[Sequence[Frame]], answers: int) -> Directions:
@@ -47,12 +46,12 @@ def directions(sent: np.ndarray, received: np.ndarray, frames: Sequence[Sequence
     whole = np.isfinite(a)
     if not whole.any():
         half = 0.5 * (received - sent)
-        return Directions(half, half.copy(), float(half.max()), a - c)
+        return Directions(half, half.copy(), float(half.max()))
     low, high = np.max((a - received)[whole]), np.min((c - sent)[np.isfinite(c)])
     offset = 0.5 * (low + high)
     actuator = np.maximum(c - offset - sent, 0.0)
     sensor = np.where(whole, np.maximum(received - (c - offset), 0.0), nan)
-    return Directions(sensor, actuator, 0.5 * abs(high - low), a - c)
+    return Directions(sensor, actuator, 0.5 * abs(high - low))
 
 
 def _from_command(heard: Sequence[Frame], command: int | None) -> list[float]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
@@ -12,14 +10,7 @@ import traitlets
 
 from rds.panels.code.completions import Word
 from rds.panels.equipment.build import Mark
-from rds.panels.kit.codemirror import module
-
-_STATIC = Path(__file__).parent / "static"
-
-
-@cache
-def _style() -> str:
-    return (_STATIC / "code.css").read_text(encoding="utf-8")
+from rds.panels.kit.static_files import codemirror, static
 
 
 class CodeEditor(anywidget.AnyWidget):
@@ -37,7 +28,7 @@ class CodeEditor(anywidget.AnyWidget):
     words: Any = traitlets.List([]).tag(sync=True)
 
     def __init__(self, on_run: Callable[[], Any], on_drop: Callable[[str, bytes], Any], **options: Any):
-        super().__init__(_esm=module(_STATIC / "code.js"), _css=_style(), **options)
+        super().__init__(_esm=codemirror(__file__, "code.js"), _css=static(__file__, "code.css"), **options)
         self.add_class("rds-code-widget")
         self._on_run, self._on_drop = on_run, on_drop
         self.on_msg(self._asked)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.controllers.tracking import OBSERVER_POLE, POLES
 from rds.core.errors import InputError
 from rds.core.shared_quantities import SAMPLE_PERIOD
+from rds.core.types import SPINDLE_UNIT
 from rds.machines import Machine
 from rds.panels.session.fields import Choice, Field, Number, Text
 

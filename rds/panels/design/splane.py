@@ -4,20 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from math import isfinite
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
-_STATIC = Path(__file__).parent / "static"
-
-
-@cache
-def _module(name: str) -> str:
-    return (_STATIC / name).read_text(encoding="utf-8")
+from rds.panels.kit.static_files import static
 
 
 class SPlane(anywidget.AnyWidget):
@@ -34,7 +27,7 @@ class SPlane(anywidget.AnyWidget):
     height = traitlets.Int(330).tag(sync=True)  # px
 
     def __init__(self, on_move: Callable[[str, complex, bool], None], **options: Any):
-        super().__init__(_esm=_module("splane.js"), **options)
+        super().__init__(_esm=static(__file__, "splane.js"), **options)
         self._on_move = on_move
         self.on_msg(self._told)
 
@@ -62,7 +55,7 @@ class Curves(anywidget.AnyWidget):
     height = traitlets.Int(230).tag(sync=True)  # px of each
 
     def __init__(self, **options: Any):
-        super().__init__(_esm=_module("curves.js"), **options)
+        super().__init__(_esm=static(__file__, "curves.js"), **options)
 
 
 def series(x: Any, y: Any, name: str = "", color: str = "", **look: Any) -> Mapping[str, Any]:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
+import anywidget
 import ipywidgets as widgets
+import traitlets
 
-from rds.panels.drawing.cells import Cells
 from rds.panels.drawing.state import CELLS, PICTURES, Drawing
 from rds.panels.kit.button import attempt, button
 from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.file_import import FileImport
-from rds.panels.kit.layout import row
+from rds.panels.kit.layout import fields_group, row
 from rds.panels.kit.notice import Notice
+from rds.panels.kit.static_files import static
 
 _OUTLINE = ["pixel", "columns", "rows", "picture", "level", "specks", "invert", "holes", "method", "tolerance", "arcs"]
 _CUT = ["feed", "depth", "passes", "safe", "spindle", "x", "y"]
@@ -38,10 +40,10 @@ class DrawingView:
         self.upload = FileImport("Take a picture", tip, self._take, self.notice, accept=",".join(PICTURES))
         self._views = {name: FieldView(choices, name) for name in ["source", "program", *_OUTLINE, *_CUT]}
         self._place = widgets.VBox([])
-        self._outline_box, cut = _group([]), _group([self._views[name] for name in _CUT])
+        self._outline_box, cut = fields_group([]), fields_group([self._views[name] for name in _CUT])
         folded = widgets.Accordion([cut], titles=("Cut: feed, depth, place",), selected_index=None)
         folded.add_class("rds-folded")
-        side = widgets.VBox([_group([self._views["source"]]), self._outline_box, folded])
+        side = widgets.VBox([fields_group([self._views["source"]]), self._outline_box, folded])
         side.add_class("rds-side")
         tip = "Write the part program and open it in the program panel"
         top = row(self._views["program"], button("Make the program", tip, self.make, self.notice, primary=True))
@@ -108,8 +110,21 @@ class DrawingView:
             )
 
 
-def _group(children: list[widgets.Widget]) -> widgets.Box:
-    box = widgets.Box(children)
-    box.add_class("rds-group")
-    box.add_class("rds-fields")
-    return box
+class Cells(anywidget.AnyWidget):
+    """A grid of cells that are filled with the mouse or the keyboard; the outline that is cut lies over it.
+
+    `text`: rows of # (filled) and . (empty), the first on top. `rings`: outlines as (column, row), in cells.
+    """
+
+    _esm = traitlets.Unicode().tag(sync=True)
+    _css = traitlets.Unicode().tag(sync=True)
+    text = traitlets.Unicode(".").tag(sync=True)
+    rings: Any = traitlets.List([]).tag(sync=True)
+
+    def __init__(self, text: str):
+        super().__init__(_esm=static(__file__, "cells.js"), _css=static(__file__, "cells.css"), text=text)
+
+    def outline(self, rings: list[list[list[float]]]) -> None:
+        """Show these, which are of the cells as they are."""
+        self.rings = rings
+        self.send({"kind": "outlined"})

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
-from rds.controllers.axis_data import SPINDLE_UNIT
+from rds.core.types import SPINDLE_UNIT
 from rds.modes.loop.plan import Plan
 
 

@@ -12,6 +12,7 @@ from rds.controllers.speed_tracking import SPEED_POLE
 from rds.controllers.tracking import OBSERVER_POLE, POLES
 from rds.core.quantities import Declaration, Quantity
 from rds.core.shared_quantities import SAMPLE_PERIOD
+from rds.core.types import SPINDLE_UNIT
 from rds.machines import Axis, Machine
 from rds.modes.loop.following_error import LARGEST
 from rds.modes.loop.mode import Drive
@@ -25,7 +26,6 @@ from rds.references import signal_kinds, signal_options
 USER = "user"  # the choice of something that the student wrote
 PREFIX = "controller."  # of the fields of a controller's parameters
 OF_MODEL = "model."  # of those of a student's model
-SPINDLE = "rev/min"
 FERROR = "ferror"  # the field of the largest following error
 DRIVEN_BY: dict[str, Drive] = {"model": "signal", "control": "controller"}  # what drives the axes, by panel
 SIZES = ("amplitude", "frequency", "offset")  # of a signal: fields that most kinds share
@@ -49,7 +49,7 @@ OF_SPINDLE = f"{PREFIX}speed_pole"
 _COMMENT = 40  # characters of a file's comment that stand beside a field
 _FIRST_OF = {"lowest": 0.5, "highest": 20.0, "sweep": 5.0, "steps": 5}  # Hz, Hz, s
 # first values that every axis of the mini CNC can follow: (amplitude, frequency) by what is driven
-_FIRST = {"V": (2.0, 1.0), "mm": (5.0, 0.2), SPINDLE: (200.0, 0.5)}
+_FIRST = {"V": (2.0, 1.0), "mm": (5.0, 0.2), SPINDLE_UNIT: (200.0, 0.5)}
 
 
 def first_fields(kind: str, machine: Machine, kept: object = None) -> Iterable[Field]:
@@ -100,7 +100,7 @@ def first_fields(kind: str, machine: Machine, kept: object = None) -> Iterable[F
             FERROR,
             "Largest following error",
             tooltip="how far the axis may be from its reference before the run ends, at its largest velocity and below",
-            unit=axis.unit if axis.unit != SPINDLE else "mm",
+            unit=axis.unit if axis.unit != SPINDLE_UNIT else "mm",
             optional=True,
             when_empty="not watched",
         )
@@ -113,7 +113,7 @@ def axes_of(system: str) -> list[str]:
 
 def _systems(kind: str, machine: Machine) -> dict[str, str]:
     """Each axis alone; for controllers, the first two linear axes and all three together as well."""
-    alone = {name: "Spindle" if axis.unit == SPINDLE else f"{name} axis" for name, axis in machine.axes.items()}
+    alone = {name: "Spindle" if axis.unit == SPINDLE_UNIT else f"{name} axis" for name, axis in machine.axes.items()}
     linear = [name for name in machine.axes if name in ("X", "Y", "Z")]
     several = [linear[:count] for count in (2, 3) if kind == "control" and len(linear) >= count]
     return alone | {TOGETHER.join(names): " and ".join([", ".join(names[:-1]), names[-1]]) for names in several}
@@ -144,8 +144,8 @@ def _path_fields() -> Iterable[Field]:
 
 def controllers(machine: Machine, axis: Axis) -> Choice:
     """The controllers that an axis can have, the usual one of its machine first: a spindle has no position."""
-    fitting = [name for name in controller_names() if axis.unit != SPINDLE or is_for_spindle(name)]
-    first = "pid" if axis.unit == SPINDLE else usual_controller(machine)
+    fitting = [name for name in controller_names() if axis.unit != SPINDLE_UNIT or is_for_spindle(name)]
+    first = "pid" if axis.unit == SPINDLE_UNIT else usual_controller(machine)
     options = labels(fitting, _CONTROLLERS) | {USER: "User-defined"}
     return Choice("controller", "Controller", "the law that answers with a voltage", first, options)
 
@@ -157,7 +157,7 @@ def sizes(kind: str, machine: Machine, axis: Axis) -> Iterable[Field]:
     else:
         unit, (low, top) = axis.unit, axis.travel
         reach = max(abs(low), abs(top))
-        high = top if unit == SPINDLE else (top - low) / 2.0
+        high = top if unit == SPINDLE_UNIT else (top - low) / 2.0
     amplitude, frequency = _FIRST.get(unit, (1.0, 0.2))
     yield Number("amplitude", "Amplitude", "middle to peak", min(amplitude, high), unit=unit, low=0.0, high=high)
     yield Number("frequency", "Frequency", "periods per second", frequency, unit="Hz", above=0.0, high=1000.0)
@@ -169,7 +169,7 @@ def parameter_fields(controller: str, axis: Axis) -> Iterable[Field]:
     if controller == USER:
         return
     if controller == "tracking":
-        yield from _speed_fields() if axis.unit == SPINDLE else _tracking_fields()
+        yield from _speed_fields() if axis.unit == SPINDLE_UNIT else _tracking_fields()
         return
     options: Mapping[str, Declaration] = controller_module(controller).OPTIONS
     for name, option in options.items():

@@ -11,6 +11,7 @@ from rds.core.errors import InputError
 from rds.panels.equipment.state import Equipment
 from rds.panels.kit.button import button
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import fields_group
 from rds.panels.kit.notice import Notice
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Number
@@ -153,9 +154,8 @@ def count_changed(choices: Choices, names: Iterable[str]) -> int:
 
 def box_of_fields() -> widgets.Box:
     """An empty box for fields, out of sight."""
-    box = widgets.Box([], layout={"display": "none"})
-    box.add_class("rds-group")
-    box.add_class("rds-fields")
+    box = fields_group([])
+    box.layout.display = "none"
     return box
 
 

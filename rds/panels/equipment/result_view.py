@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import ipywidgets as widgets
 
+from rds.modes.experiment.report import STAGE_FIGURES
 from rds.panels.equipment.live_view import changes_table
 from rds.panels.equipment.result_actions import ResultActions, Saved
 from rds.panels.kit.figure import FigureView
@@ -27,7 +28,6 @@ _NO_TIMING = (
     "long each part of a sample took, and the samples that were late.</p>"
 )
 SENT = ("report.html", "result.csv")  # by e-mail; the report first
-_STAGES = ("p50", "p99", "p999", "max")
 
 
 class ResultView:
@@ -101,7 +101,7 @@ class ResultView:
             self.timing_numbers.value = "<p>A simulation runs in virtual time: there is no timing to judge.</p>"
             return
         rows = [
-            [words, *(summary[stage][key] for key in _STAGES)]
+            [words, *(summary[stage][key] for key in STAGE_FIGURES)]
             for stage, words in _STAGE_NAMES.items()
             if stage in summary
         ]

@@ -85,30 +85,41 @@ class EquipmentRun:
                 if (program := self.plan.program) is not None:
                     self.prepared = PATHS.module("path").as_prepared(program, Path(program.name), self.plan.T)
                 self._tell(task, "starting the loop" if self.real_time else "simulating")
-                held.enter_context(saving(self.folder))
-                run = experiment.start(out=self.folder)
-                self._run = run
-                if task.stopping:
-                    run.stop()
-                running = "running" if self.real_time else "simulating"
                 # before the first sample the loop is still being started, and its note stays; so does that of a stop
-                try:
-                    self.result = run.wait(
-                        lambda taken, of: task.advance(taken, of, running if taken and not task.stopping else "")
-                    )
-                except ContractError as error:  # what there is up to the fault is a result
-                    self.result = error.result if isinstance(error, FailedRun) else recorded(self.folder)
-                    raise
-                except RdsError as error:
-                    raise_stopped(task, error)
-                    raise
+                return self._follow(
+                    *(task, held, lambda: experiment.start(out=self.folder)),
+                    lambda taken, of, note: task.advance(taken, of, note if taken else ""),
+                )
             finally:
                 self.session.give_machine_back(self)
                 if self.result is not None and self.plan is not None:
                     keep_choices(self.folder, self.table)
                     judged = self.plan.program if "program" in self.result.meta else None  # one that failed may not be
                     self._write_files(save_run, self.result, judged, self.folder, self.title, held=held)
-            return self.result
+
+    def _follow(
+        self,
+        task: Task[Result],
+        held: contextlib.ExitStack,
+        start: Callable[[], Run],
+        advance: Callable[[int, int, str], None],
+    ) -> Result:
+        """Start the run and wait for its result; `advance(taken, of, note)` hears of each look at it."""
+        held.enter_context(saving(self.folder))
+        self._run = run = start()
+        if task.stopping:
+            run.stop()
+        running = "running" if self.real_time else "simulating"
+        try:
+            self.result = result = run.wait(lambda taken, of: advance(taken, of, "" if task.stopping else running))
+            return result
+        except ContractError as error:  # what there is up to the fault is a result
+            self.result = error.result if isinstance(error, FailedRun) else _recorded(self.folder)
+            raise
+        except RdsError as error:
+            if task.stopping and type(error) is RdsError:  # what a loop says that was stopped before its first sample
+                raise Stopped from error
+            raise
 
     def _await_turn(self, task: Task[Result], held: contextlib.ExitStack) -> None:
         """Wait while too many earlier runs are not written yet; `held` counts this one until it is."""
@@ -257,13 +268,7 @@ class EquipmentRun:
         return list(self._run.changes) if self._run is not None else []
 
 
-def raise_stopped(task: Task[Any], error: RdsError) -> None:
-    """Raise Stopped in the place of what a loop says that was stopped before its first sample."""
-    if task.stopping and type(error) is RdsError:
-        raise Stopped from error
-
-
-def recorded(folder: Path) -> Result | None:
+def _recorded(folder: Path) -> Result | None:
     """What a loop against the clock recorded until it failed, saved as tables; None where it has no sample."""
     try:
         result = open_result(folder)

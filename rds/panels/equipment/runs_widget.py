@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
+from rds.panels.kit.static_files import static
 from rds.panels.session.run_table import RunRow
-
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "runs.js").read_text(encoding="utf-8")
 
 
 class RunsWidget(anywidget.AnyWidget):
@@ -33,7 +27,7 @@ class RunsWidget(anywidget.AnyWidget):
         on_star: Callable[[str, bool], Any],
         on_note: Callable[[str, str], Any],
     ):
-        super().__init__(_esm=_module())
+        super().__init__(_esm=static(__file__, "runs.js"))
         self._on_open, self._on_star, self._on_note = on_open, on_star, on_note
         self.on_msg(self._asked)
 

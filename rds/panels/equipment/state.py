@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError, RdsError
+from rds.core.types import SPINDLE_UNIT
 from rds.machines import Axis, Machine, load_machine
 from rds.modes import SIMULATION, load_mode
 from rds.modes.experiment.experiment import Experiment
@@ -29,7 +30,6 @@ from rds.panels.equipment.fields import (
     POLE,
     PREFIX,
     SIZES,
-    SPINDLE,
     USER,
     axes_of,
     controllers,
@@ -122,7 +122,7 @@ class Equipment:
         idle |= {"radius", "feed", "laps"} if chosen["shape"] != CIRCLE else {"path_file"}
         if len(self.axes) == 1 or chosen["controller"] != USER:
             idle.add("coupled")
-        if self.axis.unit == SPINDLE:
+        if self.axis.unit == SPINDLE_UNIT:
             idle.add(FERROR)
         if not load_mode(str(chosen["mode"])).modelled:  # the machine alone
             idle |= {"model", "model_file"}

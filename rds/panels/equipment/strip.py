@@ -7,8 +7,6 @@ they leave the kernel, and sent as bytes; all that was recorded stays in the run
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
@@ -18,20 +16,14 @@ import traitlets
 from rds.core.colours import BLUE, QUANTITIES
 from rds.core.types import Ending
 from rds.panels.kit.row_stream import RowStream
+from rds.panels.kit.static_files import static
 from rds.results import Result
 
-_STATIC = Path(__file__).parent / "static"
 DASHES: tuple[list[int], ...] = ([], [9, 4], [3, 3], [9, 3, 3, 3])  # by axis, of several
 _LANES = {"error": "error", "voltage": "voltage", "target": "target", "contour error": "contour error"}
 _WEIGHTS = {"position": 1.8, "voltage": 0.9, "target": 0.9}  # how high a lane is, beside 1
 _ORDER = ("position", "error", "contour error", "voltage", "target")  # of the lanes, from the top
 MOST_GHOST = 5_000  # rows of an earlier run that are sent, at most twice as many
-
-
-@cache
-def _module() -> str:
-    chart = (_STATIC / "uPlot.iife.min.js").read_text(encoding="utf-8")
-    return chart + "\n" + (_STATIC / "strip.js").read_text(encoding="utf-8")
 
 
 class StripChart(anywidget.AnyWidget):
@@ -46,7 +38,8 @@ class StripChart(anywidget.AnyWidget):
     ghost = traitlets.Unicode("").tag(sync=True)  # the name of an earlier run that stands behind; none: ""
 
     def __init__(self, **options: Any):
-        super().__init__(_esm=_module(), _style=(_STATIC / "uPlot.min.css").read_text(encoding="utf-8"), **options)
+        chart = static(__file__, "uPlot.iife.min.js", "strip.js")
+        super().__init__(_esm=chart, _style=static(__file__, "uPlot.min.css"), **options)
         self.stream = RowStream()
         self._ghost = np.empty((0, 1))
         self.on_msg(self._asked)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rds.controllers.axis_data import SPINDLE_UNIT
+from rds.core.types import SPINDLE_UNIT
 from rds.machines.machine import Axis, Machine
 
 _REST = 0.08  # s from the highest speed to rest at most

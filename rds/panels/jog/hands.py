@@ -10,10 +10,9 @@ from rds.bus.modules.calling import find_machine
 from rds.bus.modules.dialects import SERIAL_DIALECTS, open_drivers
 from rds.bus.tools.link import default_channel
 from rds.controllers import library_controller
-from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.core.contracts import Drivers, Watch
 from rds.core.errors import MachineError
-from rds.core.types import Controller, Reference
+from rds.core.types import SPINDLE_UNIT, Controller, Reference
 from rds.machines.machine import Axis, Machine
 from rds.panels.jog.axes import JogAxis, JogSpindle, jog_axes, jog_spindles
 

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
 from rds.panels.jog.answers import Answers
+from rds.panels.kit.static_files import static
 
 _FRESH = 0.5  # s: as long as static/hold.js waits for an answer
-
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "hold.js").read_text(encoding="utf-8")
 
 
 class HoldButtons(anywidget.AnyWidget):
@@ -33,7 +27,7 @@ class HoldButtons(anywidget.AnyWidget):
     disabled = traitlets.Bool(True).tag(sync=True)
 
     def __init__(self, on_word: Callable[[str, int], None], **options: Any):
-        super().__init__(_esm=_module(), **options)
+        super().__init__(_esm=static(__file__, "hold.js"), **options)
         self._on_word = on_word
         self._answers = Answers(_FRESH)
         self.on_msg(self._told)

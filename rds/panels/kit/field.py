@@ -167,9 +167,8 @@ def check_mended(views: Iterable[FieldView]) -> None:
         raise InputError(f"first mend what is refused: {', '.join(refused)}")
 
 
-def field_group(choices: Choices, names: list[str], title: str = "") -> widgets.VBox:
-    """Fields under a heading."""
-    head = [Html(f"<h3>{escape(title)}</h3>")] if title else []
-    group = widgets.VBox([*head, *(FieldView(choices, name) for name in names)])
+def field_group(choices: Choices, names: list[str]) -> widgets.VBox:
+    """Fields that belong together."""
+    group = widgets.VBox([FieldView(choices, name) for name in names])
     group.add_class("rds-group")
     return group

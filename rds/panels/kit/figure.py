@@ -9,9 +9,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable
-from functools import cache
 from html import escape
-from pathlib import Path
 from typing import Any
 
 import anywidget
@@ -20,6 +18,7 @@ import traitlets
 
 from rds.core.errors import RdsError
 from rds.panels.kit.html import Html
+from rds.panels.kit.static_files import static
 from rds.panels.kit.ticker import Ticker
 from rds.panels.session.session import Session
 from rds.panels.texts import translate_picture
@@ -135,18 +134,13 @@ class FigureView(widgets.VBox):
             self._shown[0].value = self.figure.png()
 
 
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "room.js").read_text(encoding="utf-8")
-
-
 class _Room(anywidget.AnyWidget):
     """Invisible; calls `told(pixels)` with the width of its place, each time that it is another one."""
 
     _esm = traitlets.Unicode().tag(sync=True)
 
     def __init__(self, told: Callable[[float], None]):
-        super().__init__(_esm=_module())
+        super().__init__(_esm=static(__file__, "room.js"))
         self._told = told
         self.on_msg(self._said)
 

@@ -7,8 +7,7 @@ is lost without a word. Parts pass there, and the button says how far it is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, partial
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import anywidget
@@ -16,13 +15,9 @@ import traitlets
 
 from rds.core.errors import InputError
 from rds.panels.kit.button import Notice, attempt
+from rds.panels.kit.static_files import static
 
 LARGEST = 250_000_000  # bytes of a file: it is in the kernel's memory until it is whole
-
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "file_import.js").read_text(encoding="utf-8")
 
 
 class FileImport(anywidget.AnyWidget):
@@ -37,7 +32,7 @@ class FileImport(anywidget.AnyWidget):
     accept = traitlets.Unicode().tag(sync=True)
 
     def __init__(self, text: str, tip: str, take: Callable[[str, bytes], Any], notice: Notice, accept: str = ""):
-        super().__init__(_esm=_module(), text=text, tip=tip, accept=accept)
+        super().__init__(_esm=static(__file__, "file_import.js"), text=text, tip=tip, accept=accept)
         self._take, self._notice = take, notice
         self._whose = ""  # the word that the browser gave this file; another one's parts are not mixed in
         self._name, self._size, self._content = "", 0, bytearray()

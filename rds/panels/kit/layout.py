@@ -23,6 +23,14 @@ def group(title: str, *children: Any) -> widgets.VBox:
     return box
 
 
+def fields_group(children: list[widgets.Widget]) -> widgets.Box:
+    """Fields beside and below each other, as there is room."""
+    box = widgets.Box(children)
+    box.add_class("rds-group")
+    box.add_class("rds-fields")
+    return box
+
+
 def columns(side: list[Any], main: list[Any]) -> widgets.HBox:
     """Settings at the left, what comes of them at the right."""
     left, right = widgets.VBox(side), widgets.VBox(main)

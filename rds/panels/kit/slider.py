@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
+from rds.panels.kit.static_files import static
 from rds.panels.session.fields import Number
 
 _TIMES = 4.0  # how far a slider goes where a number may be anything: so many times what it is
-
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "slider.js").read_text(encoding="utf-8")
 
 
 class Slider(anywidget.AnyWidget):
@@ -32,7 +26,7 @@ class Slider(anywidget.AnyWidget):
     disabled = traitlets.Bool(False).tag(sync=True)
 
     def __init__(self, on_value: Callable[[float], None]):
-        super().__init__(_esm=_module())
+        super().__init__(_esm=static(__file__, "slider.js"))
         self._on_value = on_value
         self.on_msg(self._told)
 

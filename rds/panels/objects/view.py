@@ -9,7 +9,7 @@ import ipywidgets as widgets
 from rds.panels.kit.button import button
 from rds.panels.kit.field import FieldView, check_mended
 from rds.panels.kit.figure import FigureView
-from rds.panels.kit.layout import columns, row
+from rds.panels.kit.layout import columns, fields_group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.objects.state import OF_ALL, Objects
 
@@ -29,9 +29,9 @@ class ObjectsView:
         self._views = {
             name: FieldView(choices, name, buttons=False if name == "points_file" else None) for name in choices.fields
         }
-        self._form = _group([])
+        self._form = fields_group([])
         folded = widgets.Accordion(
-            [_group([self._views[name] for name in OF_ALL if name != "feed"])],
+            [fields_group([self._views[name] for name in OF_ALL if name != "feed"])],
             titles=("Program: safe height, spindle",),
             selected_index=None,
         )
@@ -39,7 +39,7 @@ class ObjectsView:
         tip = "Write the part program and open it in the program panel"
         top = row(self._views["program"], button("Make the program", tip, self.make, self.notice, primary=True))
         top.layout.align_items = "flex-end"
-        side = [_group([self._views["object"]]), self._form, folded]
+        side = [fields_group([self._views["object"]]), self._form, folded]
         self.widget = columns(side, [top, self.notice, self.verdict, self.figure])
         choices.watch(self._chosen)
         self._arrange()
@@ -86,10 +86,3 @@ def _picture(found: Any) -> Any:
     from rds.nc.paths.pictures import picture
 
     return picture(found.segments, found.said)
-
-
-def _group(children: list[widgets.Widget]) -> widgets.Box:
-    box = widgets.Box(children)
-    box.add_class("rds-group")
-    box.add_class("rds-fields")
-    return box

@@ -5,8 +5,6 @@ Nothing has to be pressed. The page asks for the samples once it is in sight; th
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
@@ -14,18 +12,13 @@ import numpy as np
 import traitlets
 
 from rds.modes import SIMULATION
+from rds.panels.kit.static_files import static
 from rds.panels.session.session import Session
 from rds.panels.session.task import Task
 
 RATE = 50  # samples a second that are shown
 _REFERENCE = {"kind": "sinusoid", "amplitude": 5.0, "frequency": 0.5}
 _PERIODS = 2  # simulated; the last one is shown, again and again
-_STATIC = Path(__file__).parent / "static"
-
-
-@cache
-def _module() -> str:
-    return (_STATIC / "alive.js").read_text(encoding="utf-8")
 
 
 class Alive(anywidget.AnyWidget):
@@ -36,7 +29,7 @@ class Alive(anywidget.AnyWidget):
     unit = traitlets.Unicode("").tag(sync=True)
 
     def __init__(self, session: Session, ticker: Any):
-        super().__init__(_esm=_module())
+        super().__init__(_esm=static(__file__, "alive.js"))
         self._session, self._ticker = session, ticker
         self._rows: np.ndarray | None = None
         self._task: Task[tuple[str, str, np.ndarray]] | None = None

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import ipywidgets as widgets
 import traitlets
 
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "colours.js").read_text(encoding="utf-8")
+from rds.panels.kit.static_files import static
 
 
 class Colours(anywidget.AnyWidget):
@@ -24,7 +19,7 @@ class Colours(anywidget.AnyWidget):
     dark = traitlets.Bool(False).tag(sync=True)
 
     def __init__(self, show: Callable[[bool], None]):
-        super().__init__(_esm=_module())
+        super().__init__(_esm=static(__file__, "colours.js"))
         self._show = show
         self._preferred = False  # what the browser said last
         self.button = widgets.ToggleButton(description="Dark", tooltip="Dark or light colours", value=False)

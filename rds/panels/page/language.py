@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import ipywidgets as widgets
 import traitlets
 
+from rds.panels.kit.static_files import static
 from rds.panels.session.fields import Choice
 from rds.panels.session.session import Session
 from rds.panels.texts import ENGLISH, languages, texts
 
 _AS_BROWSER = "as the browser"
-
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "texts.js").read_text(encoding="utf-8")
 
 
 class Language(anywidget.AnyWidget):
@@ -30,7 +24,7 @@ class Language(anywidget.AnyWidget):
     texts: Any = traitlets.Dict().tag(sync=True)
 
     def __init__(self, session: Session):
-        super().__init__(_esm=_module())
+        super().__init__(_esm=static(__file__, "texts.js"))
         self._session = session
         known = {"en": ENGLISH} | languages()
         field = Choice("language", "Language", "of the panels", _AS_BROWSER, {_AS_BROWSER: _AS_BROWSER} | known)

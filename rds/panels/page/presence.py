@@ -9,22 +9,16 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
 from rds.core.errors import InputError
+from rds.panels.kit.static_files import static
 from rds.panels.session.expired_orders import LATE, refusal
 
 _MOST = 100  # answers of which it is remembered when they were given
-
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "presence.js").read_text(encoding="utf-8")
 
 
 class Presence(anywidget.AnyWidget):
@@ -38,7 +32,7 @@ class Presence(anywidget.AnyWidget):
     patience = traitlets.Float(1e3 * LATE).tag(sync=True)  # ms
 
     def __init__(self, here: Callable[[], None], late: Callable[[str], None]):
-        super().__init__(_esm=_module())
+        super().__init__(_esm=static(__file__, "presence.js"))
         self._here, self._late = here, late
         self._answered: dict[int, float] = {}  # number of the word -> when, s of time.monotonic()
         self._age = 0.0  # s, of the order that comes next

@@ -4,35 +4,27 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from functools import cache
 from html import escape
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import anywidget
 import ipywidgets as widgets
+import traitlets
 
 from rds.core.errors import RdsError
 from rds.panels.kit.button import button, order
 from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
+from rds.panels.kit.static_files import static
 from rds.panels.kit.ticker import Ticker
 from rds.panels.page.colours import Colours
 from rds.panels.page.emergency import emergency_stop
-from rds.panels.page.keys import Keys
 from rds.panels.page.language import Language
 from rds.panels.page.presence import Presence
-from rds.panels.page.rescue import Rescue
 from rds.panels.page.still_here import StillHere
 from rds.panels.registry import PANELS
 from rds.panels.session.session import Message, Session
-
-_STYLE = Path(__file__).parent / "static" / "style.css"
-
-
-@cache
-def _style() -> str:
-    return f"<style>{_STYLE.read_text(encoding='utf-8')}</style>"
 
 
 class Shell:
@@ -66,7 +58,8 @@ class Shell:
         self.presence = Presence(self._shown, lambda sentence: self.say(sentence, "warning"))
         self.language = Language(session)
         self.still_here = StillHere()  # for what must not go on when the last browser has gone
-        unseen = [self.presence, self.still_here, self.colours, self.language, Keys(), Html(_style())]
+        style = Html(f"<style>{static(__file__, 'style.css')}</style>")
+        unseen = [self.presence, self.still_here, self.colours, self.language, Keys(), style]
         self.widget = widgets.VBox([*unseen, self._corner(), self._head(), self._notice, body, self._rescue])
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick
@@ -170,3 +163,34 @@ class Shell:
                 self.open(f"equipment-{is_driven_by(going[0])}")
         elif [run.state for run in self.session.runs(1)] == [State.CUT_SHORT]:
             self.say("the last run was cut short; what it recorded can be opened among the earlier runs", "warning")
+
+
+class Keys(anywidget.AnyWidget):
+    """A panel by the keyboard and by ear: what ipywidgets leaves to mouse and eye. Invisible; one on a page."""
+
+    _esm = traitlets.Unicode().tag(sync=True)
+
+    def __init__(self) -> None:
+        super().__init__(_esm=static(__file__, "keys.js"))
+
+
+class Rescue(anywidget.AnyWidget):
+    """The page's way around its own kernel, which a single call of a student's code may hold.
+
+    Hidden while the kernel answers the page, once a second; else what it is at, and a button that ends it.
+    The emergency stop goes to the page's server as well, with `channels`: those of the built-in bus beside the
+    machine's own. Only on the page of `rds app`: JupyterLab has buttons of its own for its kernels.
+    """
+
+    _esm = traitlets.Unicode().tag(sync=True)
+    _css = traitlets.Unicode().tag(sync=True)
+    channels: Any = traitlets.List([]).tag(sync=True)
+
+    def __init__(self) -> None:
+        super().__init__(_esm=static(__file__, "rescue.js"), _css=static(__file__, "rescue.css"))
+        self.on_msg(self._asked)
+
+    def _asked(self, _: Any, content: Any, __: Any) -> None:
+        """Anything else than the question whether it is there does nothing."""
+        if content == {"kind": "beat"}:
+            self.send({"kind": "beat"})

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import time
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
+from rds.panels.kit.static_files import static
+
 IN_SIGHT = 20.0  # s without a word of a page that was in sight, which says one every five
 IN_BACKGROUND = 90.0  # s without a word of a page in the background, which browsers let say one each minute
-
-
-@cache
-def _module() -> str:
-    return (Path(__file__).parent / "static" / "still_here.js").read_text(encoding="utf-8")
 
 
 class StillHere(anywidget.AnyWidget):
@@ -25,7 +20,7 @@ class StillHere(anywidget.AnyWidget):
     _esm = traitlets.Unicode().tag(sync=True)
 
     def __init__(self) -> None:
-        super().__init__(_esm=_module())
+        super().__init__(_esm=static(__file__, "still_here.js"))
         self.until = time.monotonic() + IN_SIGHT
         self.on_msg(self._said)
 

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
 import traitlets
 
-from rds.panels.kit.codemirror import module
+from rds.panels.kit.static_files import codemirror, static
 from rds.panels.program.check import Mark
-
-_STATIC = Path(__file__).parent / "static"
-
-
-@cache
-def _style() -> str:
-    return (_STATIC / "editor.css").read_text(encoding="utf-8")
 
 
 class Editor(anywidget.AnyWidget):
@@ -36,7 +27,7 @@ class Editor(anywidget.AnyWidget):
     words: Any = traitlets.List([]).tag(sync=True)  # what is offered, and said of a word under the mouse
 
     def __init__(self, on_save: Callable[[], None], **options: Any):
-        super().__init__(_esm=module(_STATIC / "editor.js"), _css=_style(), **options)
+        super().__init__(_esm=codemirror(__file__, "editor.js"), _css=static(__file__, "editor.css"), **options)
         self.add_class("rds-editor-widget")
         self._on_save = on_save
         self.on_msg(self._asked)

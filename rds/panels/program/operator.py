@@ -7,13 +7,16 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import anywidget
+import traitlets
+
 from rds.core.errors import InputError
 from rds.panels.kit.button import attempt, halt, order, run_order
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
+from rds.panels.kit.static_files import static
 from rds.panels.kit.work_bar import WorkBar
-from rds.panels.program.override import OverrideSlider
 from rds.panels.program.run import ProgramWork
 from rds.panels.session.choices import Choices
 from rds.panels.session.expired_orders import refusal
@@ -99,3 +102,31 @@ class Operator:
                 self._in_time(_OVERRIDE, moved=True)
             work.override(percent / 100.0)
         self._choices.set("override", percent)
+
+
+class OverrideSlider(anywidget.AnyWidget):
+    """More of the feed override, while something moves, is an order that may come late.
+
+    `on_word(percent, ordered)` hears what is asked for; `ordered` is whether presence.js has let it go. The slider
+    shows `value`, in per cent, which whoever hears sets. While it `moves`, more than that is only ordered.
+    """
+
+    _esm = traitlets.Unicode().tag(sync=True)
+    value = traitlets.Float(100.0).tag(sync=True)
+    moves = traitlets.Bool(False).tag(sync=True)
+    disabled = traitlets.Bool(False).tag(sync=True)
+    tip = traitlets.Unicode("").tag(sync=True)
+
+    def __init__(self, on_word: Callable[[float, bool], None], **options: Any):
+        super().__init__(_esm=static(__file__, "override.js"), **options)
+        self._on_word = on_word
+        self.on_msg(self._told)
+
+    def _told(self, _: Any, content: Any, __: Any) -> None:
+        """Anything else than a finite number of per cent changes nothing."""
+        if not isinstance(content, dict) or content.get("kind") != "set":
+            return
+        percent, number = content.get("percent"), content.get("number")
+        if isinstance(percent, int | float) and not isinstance(percent, bool) and math.isfinite(percent):
+            self._on_word(float(percent), content.get("ordered") is True)
+        self.send({"kind": "heard", "number": number})

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
@@ -14,16 +12,11 @@ import traitlets
 from rds.machines import Machine
 from rds.nc.trace import CURVED, RAPID, STRAIGHT, Trace
 from rds.nc.validate import TOLERANCE
+from rds.panels.kit.static_files import static
 
-_STATIC = Path(__file__).parent / "static"
 _MOST = 40_000  # points that are sent; more are left out evenly, which no screen shows
 _CROSSES = 60
 _SIDES = ("XY", "ZX", "YZ")  # what is seen first: the first whose axes the machine has
-
-
-@cache
-def _static(ending: str) -> str:
-    return (_STATIC / f"path_view.{ending}").read_text(encoding="utf-8")
 
 
 class PathView(anywidget.AnyWidget):
@@ -42,7 +35,8 @@ class PathView(anywidget.AnyWidget):
 
     def __init__(self, machine: Machine, **options: Any):
         seen = next((side for side in _SIDES if set(side) <= set(machine.axes)), _SIDES[0])  # a lathe has no Y
-        super().__init__(_esm=_static("js"), _css=_static("css"), **{"side": seen, **options})
+        script, style = static(__file__, "path_view.js"), static(__file__, "path_view.css")
+        super().__init__(_esm=script, _css=style, **{"side": seen, **options})
         self._box = travel_of(machine)
         self.travel = self._box.tolist()
         self._points = [np.zeros((0, 3))] * 3

@@ -10,16 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.errors import ContractError, InputError, RdsError
-from rds.modes.experiment.experiment import FailedRun
+from rds.core.errors import InputError
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import SINGLE_STEP
 from rds.nc.run.report import save_run
 from rds.nc.run.run import PartProgram, ProgramRun, Status
 from rds.nc.setup import Setup
-from rds.panels.equipment.run import STRIP_RATE, EquipmentRun, contour_errors, raise_stopped, recorded
+from rds.panels.equipment.run import STRIP_RATE, EquipmentRun, contour_errors
 from rds.panels.program.stock import Cut
-from rds.panels.session.saving import saving
 from rds.panels.session.session import RUNS, Session
 from rds.panels.session.task import Task
 from rds.results import Result
@@ -70,27 +68,14 @@ class ProgramWork(EquipmentRun):
                 )
                 self.plan, self.prepared = part.plan(), part.prepared
                 self._tell(task, "starting the loop" if self.real_time else "simulating")
-                held.enter_context(saving(self.folder))
-                run = part.start(out=self.folder, changes=self._changes)
-                self._run = run
-                if task.stopping:
-                    run.stop()
-                note = "running" if self.real_time else "simulating"
-                try:
-                    self.result = run.wait(
-                        lambda taken, of: task.advance(taken, max(of, taken), "" if task.stopping else note)
-                    )
-                except ContractError as error:  # what there is up to the fault is a result
-                    self.result = error.result if isinstance(error, FailedRun) else recorded(self.folder)
-                    raise
-                except RdsError as error:
-                    raise_stopped(task, error)
-                    raise
+                return self._follow(
+                    *(task, held, lambda: part.start(out=self.folder, changes=self._changes)),
+                    lambda taken, of, note: task.advance(taken, max(of, taken), note),
+                )
             finally:
                 self.session.give_machine_back(self)
                 if self.result is not None and "program" in self.result.meta:
                     self._write_files(save_run, self.result, self.prepared, self.folder, held=held)
-            return self.result
 
     # what a progress bar follows: waiting is no progress
 

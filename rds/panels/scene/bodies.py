@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.types import SPINDLE_UNIT
 from rds.machines import Machine
 from rds.machines.kinematics.chain import Chain, Joint, joined
 from rds.machines.kinematics.kinematics import TIP, ZERO
 from rds.machines.link_table import BED
 
 FRAME, SLIDE, TABLE, HEAD, TOOL = "#8A9099", "#6F7F90", "#56B4E9", "#E69F00", "#5A6068"
-_SPINDLE_UNIT = "rev/min"
 
 
 def scene_of(machine: Machine) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def scene_of(machine: Machine) -> dict[str, Any]:
     frame; an arm goes from one frame's origin to another's. `table` is how high the table is in the work's frame.
     """
     made = _of_links(machine) if machine.links else _mill(machine)
-    spindle = next((name for name, axis in machine.axes.items() if axis.unit == _SPINDLE_UNIT), "")
+    spindle = next((name for name, axis in machine.axes.items() if axis.unit == SPINDLE_UNIT), "")
     return made | {"tip": TIP, "work": ZERO, "spindle": spindle}
 
 

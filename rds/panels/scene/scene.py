@@ -7,8 +7,6 @@ machine by itself, however busy the kernel is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import anywidget
@@ -17,15 +15,10 @@ import traitlets
 
 from rds.machines import Machine
 from rds.panels.kit.row_stream import RowStream
+from rds.panels.kit.static_files import static
 from rds.panels.scene.bodies import scene_of
 
-_STATIC = Path(__file__).parent / "static"
 _PARTS = ("frames.js", "draw.js", "stock.js", "scene.js")
-
-
-@cache
-def _module() -> str:
-    return "\n".join((_STATIC / name).read_text(encoding="utf-8") for name in _PARTS)
 
 
 class MachineScene(anywidget.AnyWidget):
@@ -45,8 +38,8 @@ class MachineScene(anywidget.AnyWidget):
     tools: Any = traitlets.Dict().tag(sync=True)  # by number: radius, profile, length, rings; a row's column `tool`
 
     def __init__(self, machine: Machine, **options: Any):
-        css = (_STATIC / "scene.css").read_text(encoding="utf-8")
-        super().__init__(_esm=_module(), _css=css, scene=scene_of(machine), **options)
+        css = static(__file__, "scene.css")
+        super().__init__(_esm=static(__file__, *_PARTS), _css=css, scene=scene_of(machine), **options)
         self._stream = RowStream()
         self._intended = np.empty(0, dtype="<f4")
         self.on_msg(self._asked)

@@ -13,9 +13,9 @@ from rds.core.toml_text import toml_text
 _UNITS = {"duration": "s", "sample_period": "s"}
 
 
-def as_toml(table: Mapping[str, Any], title: str = "") -> str:
+def as_toml(table: Mapping[str, Any]) -> str:
     """The experiment as the text of a TOML file, which `rds run` takes from the session's folder."""
-    return toml_text(({"title": title} if title else {}) | dict(table), "An experiment; run it with: rds run FILE")
+    return toml_text(table, "An experiment; run it with: rds run FILE")
 
 
 def as_python(table: Mapping[str, Any]) -> str:
@@ -28,13 +28,13 @@ def as_python(table: Mapping[str, Any]) -> str:
     return f"import rds\n\nexperiment = rds.Experiment(\n{body}\n)\nresult = experiment.run()\nprint(result.metrics)\n"
 
 
-def write_toml(table: Mapping[str, Any], path: Path, title: str = "") -> Path:
+def write_toml(table: Mapping[str, Any], path: Path) -> Path:
     """Write the experiment's file; InputError if there is a file of that name, or it cannot be written."""
     if path.suffix != ".toml":
         raise InputError(f"an experiment's file ends with .toml; {path.name!r} does not")
     if path.exists():
         raise InputError("there is such a file already; choose another name", str(path))
-    write_whole(path, as_toml(table, title).encode())
+    write_whole(path, as_toml(table).encode())
     return path
 
 

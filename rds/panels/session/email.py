@@ -13,7 +13,6 @@ A password comes from RDS_SMTP_PASSWORD only, and goes to the server that the en
 from __future__ import annotations
 
 import contextlib
-import ipaddress
 import mimetypes
 import os
 import re
@@ -29,6 +28,7 @@ from email.utils import make_msgid
 from pathlib import Path
 
 from rds.core.errors import InputError, MachineError
+from rds.core.loopback import is_loopback
 from rds.core.toml_table import TomlTable
 
 FILE = "email.toml"
@@ -55,7 +55,7 @@ class Server:
     password: str | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        if self.password is not None and self.security == "none" and not _is_this_computer(self.host):
+        if self.password is not None and self.security == "none" and not is_loopback(self.host.casefold()):
             raise InputError(
                 f'security = "none" would send the password to {self.host} for all to read on its way; '
                 'use "starttls" or "tls"'
@@ -119,15 +119,6 @@ def _port(security: object) -> str:
 
 def _variable(key: str) -> str:
     return f"RDS_SMTP_{key.upper()}"
-
-
-def _is_this_computer(host: str) -> bool:
-    if host.casefold() == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def check_address(text: str) -> str:

@@ -67,11 +67,6 @@ class Pattern:
                 return None
         return module
 
-    @property
-    def addressed(self) -> bool:
-        """Whether the pattern names a module."""
-        return self.module_in_identifier or "MM" in self.data
-
 
 class Pair(NamedTuple):
     """A request and the answers to it: whichever comes first."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import re
-from base64 import b64encode
 from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
 from rds.core.atomic import write_files
 from rds.results import html
+from rds.results.html import image
 from rds.results.report import page
 from rds.results.reports.content import Report, Table
 
@@ -44,7 +44,7 @@ def to_html(report: Report, pictures: dict[str, bytes]) -> str:
             "</section>"
             for table in report.tables
         ),
-        *(f"<section><h2>{escape(name)}</h2>{_image(png, name)}</section>" for name, png in pictures.items()),
+        *(f"<section><h2>{escape(name)}</h2>{image(png, name)}</section>" for name, png in pictures.items()),
         _links(report),
         f"<details><summary>Options</summary>{html.key_values(settings)}</details>" if settings else "",
     ]
@@ -86,7 +86,3 @@ def _csv(table: Table) -> bytes:
     writer.writerow(table.columns)
     writer.writerows(["" if cell is None else cell for cell in row] for row in table.to_json()["rows"])
     return stream.getvalue().encode("utf-8")
-
-
-def _image(png: bytes, text: str) -> str:
-    return f'<img alt="{escape(text)}" src="data:image/png;base64,{b64encode(png).decode("ascii")}">'

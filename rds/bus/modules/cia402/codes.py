@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum, StrEnum
 
+NODES = range(1, 128)  # node-IDs
+
 # --- CiA 301
 
 

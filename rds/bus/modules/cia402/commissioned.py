@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from json import dumps
 from typing import Any
 
-_BARE = re.compile(r"[A-Za-z0-9_-]+")  # what a key of TOML may be without quotes
+from rds.core.toml_text import toml_key, toml_value
 
 
 @dataclass
@@ -55,11 +53,11 @@ def machine_text(choices: Choices, about: str) -> str:
     """A machine file. The model and the limits are assumptions, and say so."""
     low, high = choices.travel
     speed = round((high - low) / 4.0, 6)
-    axis = _key(choices.axis)
+    axis = toml_key(choices.axis)
     return f"""# Set up by `rds drive setup`: {"".join(letter for letter in about if letter.isprintable())}
 
-name = {_toml(choices.name)}
-title = {_toml(f"{choices.name}, one drive")}
+name = {toml_value(choices.name)}
+title = {toml_value(f"{choices.name}, one drive")}
 sample_period = {choices.period!r}          # s
 
 [converter]
@@ -68,7 +66,7 @@ bits = 16
 
 [axis.{axis}]
 node = {choices.node}
-unit = {_toml(choices.unit)}
+unit = {toml_value(choices.unit)}
 travel = [{low!r}, {high!r}]         # {choices.unit}
 resolution = {1.0 / choices.counts!r}     # {choices.unit} per count: {choices.counts:g} counts per {choices.unit}
 
@@ -91,9 +89,9 @@ def experiment_text(choices: Choices, machine: str, bus: Mapping[str, Any]) -> s
     low, high = choices.travel
     amplitude = round(min(abs(low), abs(high)) / 10.0, 6)
     lines = [
-        f"title = {_toml(('A sine' if choices.motion == 'sine' else 'Steps') + f' on {choices.axis}')}",
-        f"machine = {_toml(machine)}",
-        f"axis = {_toml(choices.axis)}",
+        f"title = {toml_value(('A sine' if choices.motion == 'sine' else 'Steps') + f' on {choices.axis}')}",
+        f"machine = {toml_value(machine)}",
+        f"axis = {toml_value(choices.axis)}",
         'mode = "implementation"',
         "duration = 8.0                 # s",
         "",
@@ -104,26 +102,14 @@ def experiment_text(choices: Choices, machine: str, bus: Mapping[str, Any]) -> s
         "",
         "[bus]",
         'dialect = "cia402"',
-        *(f"{key} = {_toml(value)}" for key, value in bus.items()),
+        *(f"{key} = {toml_value(value)}" for key, value in bus.items()),
         "",
     ]
     table = cia402_table(choices)
-    lines += ["[bus.cia402]", f'mode = "{table["mode"]}"', "", f"[bus.cia402.axis.{_key(choices.axis)}]"]
+    lines += ["[bus.cia402]", f'mode = "{table["mode"]}"', "", f"[bus.cia402.axis.{toml_key(choices.axis)}]"]
     axis = dict(table["axis"][choices.axis])
     writes = [f"[0x{index:04X}, {subindex}, {value}]" for index, subindex, value in axis.pop("write", ())]
-    lines += [f"{key} = {_toml(value)}" for key, value in axis.items()]
+    lines += [f"{key} = {toml_value(value)}" for key, value in axis.items()]
     if writes:
         lines.append(f"write = [{', '.join(writes)}]  # object, sub-index, value; before each run")
     return "\n".join(lines) + "\n"
-
-
-def _key(name: str) -> str:
-    return name if _BARE.fullmatch(name) else _toml(name)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return dumps(value, ensure_ascii=False)
-    return repr(value)

@@ -17,7 +17,7 @@ from typing import Any
 from canopen.sdo import SdoAbortedError
 
 from rds.bus.modules.cia402 import codes
-from rds.bus.modules.cia402.codes import Abort, Nmt, NmtCommand, State
+from rds.bus.modules.cia402.codes import NODES, Abort, Nmt, NmtCommand, State
 from rds.bus.modules.cia402.dictionary import Dictionary, Key
 from rds.bus.modules.cia402.errors import Errors
 from rds.bus.modules.cia402.heartbeat import Heartbeats
@@ -32,7 +32,6 @@ from rds.core.errors import InputError
 from rds.machines.machine import Axis
 
 Frame = tuple[int, bytes]
-NODES = range(1, 128)
 NMT, HEARTBEAT = 0x000, 0x700
 SAVE, LOAD = 0x65766173, 0x64616F6C  # "save" and "load": what 0x1010 and 0x1011 take
 _ON_COMMAND = 1  # 0x1010 and 0x1011: it does so on command

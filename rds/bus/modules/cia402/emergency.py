@@ -10,10 +10,9 @@ import time
 
 import can
 
-from rds.bus.modules.cia402.codes import DISABLE_VOLTAGE, State, state_of
+from rds.bus.modules.cia402.codes import DISABLE_VOLTAGE, NODES, State, state_of
 from rds.bus.tools.listening import frames_within
 
-NODES = range(1, 128)
 _REQUEST, _ANSWER = 0x600, 0x580
 _CUT = b"\x2b\x40\x60\x00" + DISABLE_VOLTAGE.to_bytes(2, "little") + bytes(2)  # write controlword 0x6040
 _CUT_DONE = b"\x60\x40\x60\x00"

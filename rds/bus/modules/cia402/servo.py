@@ -17,11 +17,11 @@ from math import floor
 
 from rds.bus.modules.cia402.codes import FOLLOWING_ERROR, NEGATIVE_SWITCH, POSITIVE_SWITCH, REFERENCE_LIMIT
 from rds.bus.modules.cia402.motions import Motion
+from rds.core.types import SPINDLE_UNIT
 from rds.machines.machine import Axis
 from rds.models.machine_axis import MachineAxis, MachineParameters
 
 TICK = 0.25e-3  # s
-SPINDLE_UNIT = "rev/min"
 SPINDLE_COUNTS = 4096  # per revolution
 NEGATIVE, POSITIVE, HOME = 1, 2, 4  # bits of the digital inputs 0x60FD
 _INSTANT = 1e-9  # s: bus time knows nothing shorter

@@ -9,16 +9,16 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from rds.bus.modules.cia402.codes import Mode
+from rds.bus.modules.cia402.codes import NODES, Mode
 from rds.bus.modules.cia402.homing import METHODS
-from rds.bus.modules.cia402.servo import SPINDLE_COUNTS, SPINDLE_UNIT
+from rds.bus.modules.cia402.servo import SPINDLE_COUNTS
 from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.core.quantities import Quantity
+from rds.core.types import SPINDLE_UNIT
 from rds.machines.machine import Axis, Machine
 
 OUR_EDS = "axis.eds"
-_NODES = range(1, 128)
 _HEARTBEAT = Quantity("time between two heartbeats", "s", 0.001, 20.0)  # one, and three, in 16 bits of ms
 _HALF = 1 << 31  # counts: a drive's positions are of 32 bits
 
@@ -138,7 +138,7 @@ def read_settings(table: Mapping[str, Any], machine: Machine, axes: Sequence[str
     _command(mode, where)
     drives = tuple(_drive(axis, {"mode": mode} | given.get(axis.name, {}), machine) for axis in used)
     nodes = [drive.node for drive in drives]
-    host = _whole(table, "host", 127, _NODES, where)
+    host = _whole(table, "host", 127, NODES, where)
     if len(set(nodes)) != len(nodes) or host in nodes:
         raise InputError(f"nodes {nodes} and host {host} must all differ", where)
     positions = table.get("positions", "start")
@@ -197,7 +197,7 @@ def _drive(axis: Axis, table: Mapping[str, Any], machine: Machine) -> DriveSetti
     return DriveSettings(
         axis=axis,
         command=_command(table["mode"], where),
-        node=_whole(table, "node", axis.node, _NODES, where),
+        node=_whole(table, "node", axis.node, NODES, where),
         eds=_eds(table.get("eds"), machine, where),
         counts=counts,
         velocity_counts=_more_than_0(

@@ -26,7 +26,6 @@ class Pair:
     free: float = 0.0
     bytes: int = 0
     busy: float = 0.0  # s
-    collisions: int = 0
     damaged: int = 0
 
     def begin(self, at: float, size: int) -> list[float]:
@@ -123,7 +122,6 @@ class FieldLine:
         """A unit begins to send; where another one sends still, neither is understood from there on."""
         at, _, data = heapq.heappop(self._sending)
         if at < self.up.free - _ROUNDING:
-            self.up.collisions += 1
             data = bytes(byte ^ 0xA5 for byte in data)
         for byte, instant in zip(data, self.up.begin(at, len(data)), strict=True):
             self._put(self._delivered, byte, instant, self.up)

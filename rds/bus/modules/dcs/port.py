@@ -18,10 +18,10 @@ from rds.bus.hub.address import lock_file
 from rds.bus.hub.bus_settings import BAUD
 from rds.bus.hub.runtime_folder import runtime_directory
 from rds.bus.modules.dcs.line import FieldLine
+from rds.core.channel_name import CHANNEL
 from rds.core.errors import InputError, MachineError
 
 SUFFIX, LOCK = ".tty", ".tty-lock"
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,31}", re.ASCII)
 _POLL = 1e-3  # s between two looks, where a port cannot be waited for
 _WRITING = 5.0  # s for a buffer of 1500 bytes to go out, and more
 
@@ -52,7 +52,7 @@ def is_device(channel: str) -> bool:
 
 def link_of(channel: str) -> Path:
     """Where the pseudo-terminal of a channel is linked. InputError for a name that none can have."""
-    if not _NAME.fullmatch(channel):
+    if not CHANNEL.fullmatch(channel):
         raise InputError(
             f"channel {channel!r} must be a serial port (/dev/ttyUSB0, COM3) or the name of a served machine: 1 to 32 "
             "letters, digits, '.', '_' and '-', the first a letter or digit"

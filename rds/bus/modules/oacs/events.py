@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -50,13 +49,12 @@ class Reconfigurations:
     `modules` is how many there should be; without it, as many as at the first look, one at least.
     """
 
-    def __init__(self, bus: can.BusABC, modules: int | None = None, clock: Callable[[], float] = time.monotonic):
+    def __init__(self, bus: can.BusABC, modules: int | None = None):
         if modules is not None and modules < 1:
             raise InputError(f"modules = {modules!r} must be at least 1")
         self._bus = bus
         self._watch = Watch(bus)
         self._expected = modules
-        self._clock = clock
         self._began: float | None = None
         self._changed = False
         self._described: set[tuple[int, int | None]] = set()  # modules that have given their data
@@ -74,7 +72,7 @@ class Reconfigurations:
     @property
     def now(self) -> float:
         """s since the first look; 0 before it."""
-        return 0.0 if self._began is None else self._clock() - self._began
+        return 0.0 if self._began is None else time.monotonic() - self._began
 
     @property
     def numbers(self) -> list[int]:
@@ -85,9 +83,9 @@ class Reconfigurations:
         """What has happened since the last look. MachineError if the bus fails."""
         first = self._began is None
         if self._began is None:
-            self._began = self._clock()
+            self._began = time.monotonic()
         changes = self._watch.look()
-        now = self._clock() - self._began
+        now = time.monotonic() - self._began
         happened = []
         for change, module, _ in changes:
             if module is None:
@@ -99,7 +97,7 @@ class Reconfigurations:
             self._expected = max(1, len(self._watch.modules))
         if self._changed and self._is_ready():
             self._changed = False
-            happened.append(Happened(self._clock() - self._began, "ready", ""))
+            happened.append(Happened(time.monotonic() - self._began, "ready", ""))
         return happened
 
     def _is_ready(self) -> bool:

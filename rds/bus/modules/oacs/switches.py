@@ -12,11 +12,11 @@ from __future__ import annotations
 class Debouncer:
     """A level that has lasted `time` s. `level` is accepted; `mark` is whatever was noted when it came."""
 
-    def __init__(self, time: float, level: bool = True):
+    def __init__(self, time: float):
         self.time = time
-        self.level = level
+        self.level = True
         self.mark = 0
-        self._raw = level
+        self._raw = True
         self._since = 0.0
         self._mark = 0
 

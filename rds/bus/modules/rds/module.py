@@ -29,13 +29,13 @@ from rds.bus.modules.rds.freshness import OLDEST, Freshness, Verdict
 from rds.bus.modules.rds.motion_frames import MotionStatus, Verb
 from rds.bus.modules.rds.node_motion import NodeMotion
 from rds.core.errors import InputError, MachineError
+from rds.core.types import SPINDLE_UNIT
 from rds.machines.machine import Axis
 from rds.models.machine_axis import MachineAxis, MachineParameters
 
 LOG = logging.getLogger(__name__)
 
 WATCHDOG_PERIODS = 10
-SPINDLE_UNIT = "rev/min"
 
 
 class AxisModule:
