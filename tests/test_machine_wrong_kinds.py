@@ -7,8 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from rds import Experiment
+from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
 
@@ -41,7 +43,9 @@ resolution = 0.01
         ({"node": "2.7"}, 5, "node = 2.7 must be a whole number"),
         ({"node": "300"}, 5, r"axis.X.node = 300 must be a whole number from 1 to 127 \(CAN node of the axis"),
         ({"node": "true"}, 5, "node = True must be a whole number"),
-        ({"more": "unit = 5"}, 8, "axis.X.unit = 5 must be a text in quotes"),
+        ({"more": "unit = 5"}, 8, "axis.X.unit = 5 is unknown; known: mm, deg, rev/min"),
+        ({"more": 'unit = "rpm"'}, 8, "axis.X.unit = 'rpm' is unknown; known: mm, deg, rev/min"),
+        ({"travel": "[-0.002, 0.003]"}, 7, "resolution = 0.01 mm per count is more than all of its travel"),
         (
             {"more": "resolutoin = 5"},
             8,
@@ -96,3 +100,21 @@ def test_an_experiment_in_a_machine_s_place_is_told_as_one() -> None:
     file = Path(__file__).parents[1] / "examples" / "experiment.toml"
     with pytest.raises(InputError, match=r"describes an experiment, not a machine.*Experiment\.from_toml"):
         Experiment(file)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("[axis.X.model]\nname = 'linear_axis'", "did you mean 'linear-axis'"),
+        ("[axis.X.model]\nname = 'linear-axis'\ntau = 0.01\nk = 1.8", "no option 'k'"),
+        ("[axis.X.machine]\ntau = 0.01\nK = 1.8\nbacklash = -0.003", "backlash = -0.003 must be at least 0 mm"),
+    ],
+)
+def test_a_check_looks_at_the_models_too(more: str, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(FILE.format(period="0.001", top="", node="1", travel="[0.0, 9.0]", more=more))
+    done = CliRunner().invoke(app, ["check", str(file)])
+    assert done.exit_code == 2 and said in done.stderr and "own.toml, [axis.X.m" in done.stderr
+    if "machine]" not in more:
+        with pytest.raises(InputError, match=r"^\[axis.X.model\] of the machine's file: .*" + said):
+            Experiment(str(file), axis="X", duration=0.1, reference=lambda t: t, controller="p")

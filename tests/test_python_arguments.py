@@ -6,6 +6,7 @@ import importlib
 import os
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from typer.testing import CliRunner
 import rds
 from rds.cli.common import say_what_is_replaced
 from rds.cli.main import app
+from rds.interpolators import Limits, arc, blended, chain, line, plan, point_to_point, trapezoid
 from rds.interpolators.acceleration import make_acceleration
 from rds.machines.machine import load_machine as loaded
 from rds.nc import Setup
@@ -163,6 +165,35 @@ def test_a_part_program_is_read_with_a_table() -> None:
 def test_what_a_part_program_is_run_with_is_checked(given: dict[str, Any], said: str) -> None:
     with pytest.raises(rds.InputError, match=said):
         rds.PartProgram("part.ngc", **given)
+
+
+MOVE = line((0, 0), (20, 0), 10.0)
+LIMITS = Limits.of(loaded("mini-cnc"))
+ROWS = ((50, 50), (400, 400), (12000, 12000))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda: line(10.0, (0, 0), (20, 0)), "a move has a start, an end and"),
+        (lambda: line((0, 0), (20, 0), 10.0, mode="G64"), "a mode that is a number, such as BLEND"),
+        (lambda: line((0, 0), (20, 0), 10.0, mode=2, tolerance=-0.02), "tolerance = -0.02"),
+        (lambda: arc((20, 0), (20, 5), (20, 10), 10.0), "given by start, end and centre, in this order"),
+        (lambda: chain([MOVE, MOVE]), "one by one"),
+        (lambda: next(plan(MOVE, LIMITS, 0.001)), r"as plan\(\[path\]"),
+        (lambda: next(plan([MOVE], loaded("mini-cnc"), 0.001)), "must be Limits"),
+        (lambda: next(plan([MOVE], LIMITS, "1ms")), "sample period T = '1ms'"),
+        (lambda: Limits.of("mini-cnc"), "is no machine"),
+        (lambda: trapezoid("10", 5, 10, 0.001), "distance = '10' must be a number"),
+        (lambda: point_to_point(0, 30, *ROWS, 0.001), "start = 0 must be a list of numbers"),
+        (lambda: point_to_point((0, 0), (30, 10), *ROWS, 0.001, end_velocity=40), "end_velocity = 40 must be a list"),
+        (lambda: blended([(0, 0), (10,)], 5, 0.001), "points must be rows"),
+        (lambda: rds.interpolate([rds.ArcSegment((1, 0), (1, 0), (0, 0), 10.0, "G3")], 0.001), "True or False"),
+    ],
+)
+def test_what_is_no_motion_is_refused_in_a_sentence(wrong: Callable[[], Any], said: str) -> None:
+    with pytest.raises(rds.InputError, match=said):
+        wrong()
 
 
 def test_a_part_program_is_a_file_and_no_device() -> None:

@@ -11,6 +11,7 @@ from rds.cli.common import Json, print_json, refusals, writes_files
 from rds.cli.machines import Force, Name, check_out, write_made
 
 _TIP = "tip_"
+_LARGEST = 10.0  # degrees or mm of a link: what an assembly could be off
 
 
 @writes_files
@@ -74,6 +75,12 @@ def calibrate(
     far = {when: np.linalg.norm(off, axis=1) for when, off in (("before", found.before), ("after", found.after))}
     rms = {when: float(np.sqrt(np.mean(each**2))) for when, each in far.items()}
     most = {when: float(each.max()) for when, each in far.items()}
+    if any(abs(value) > _LARGEST for row in found.errors.values() for value in row):
+        typer.echo(
+            f"rds: note: {data}: errors of more than {_LARGEST:g}° or {_LARGEST:g} mm are none of an assembly; see "
+            "whether columns are exchanged, a sign is wrong, or the tip was measured from another zero",
+            err=True,
+        )
     if json:
         errors = {f"LN{number}": dict(zip(ENTRIES, row, strict=True)) for number, row in found.errors.items()}
         print_json(

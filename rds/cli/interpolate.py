@@ -120,7 +120,8 @@ def _check_words(
         said = f"{' and '.join(given)} were given" if given else "there is nothing to interpolate"
         raise InputError(f"{said}; give one of a part program, --line and --arc")
     if file is not None and feed is not None:
-        raise InputError("--feed is for --line and --arc; the program's word F says its feed rate")
+        where = "`feed` of the path's file" if file.suffix == ".toml" else "the program's word F"
+        raise InputError(f"--feed is for --line and --arc; {where} says its feed rate")
     if file is None and feed is None:
         raise InputError(f"{given[0]} needs a feed rate, as in --feed 600 (mm/min) or --feed 10mm/s")
     if given != ["--arc"] and (clockwise or plane is not None):
@@ -222,6 +223,10 @@ def _follow_profile(
 
     if file is None:
         raise InputError("--profile is for a part program; --line and --arc go through interpolators (--method)")
+    if file.suffix == ".toml":
+        raise InputError(
+            f"--profile is for a part program, {file} is a path; `profile` in [reference] of an experiment plans one"
+        )
     for name, used in given.items():
         if used:
             raise InputError(f"{name} is of interpolators, and --profile takes their place; leave one of them")

@@ -297,8 +297,29 @@ def check_machine(file: Path, json: bool, axes: int | None) -> None:
 
         if axes is not None:
             raise InputError(f"--axes {axes} is for a coupled controller, and this is a machine's file", str(file))
-        judged = verdict(load_machine(str(file)))
+        machine = load_machine(str(file))
+        _check_motions(machine)
+        judged = verdict(machine)
     _show_verdict(judged, json)
+
+
+def _check_motions(machine: Machine) -> None:
+    """InputError for parameters of an axis that no model takes, or with which the machine could not be served."""
+    from rds.core.errors import InputError
+    from rds.models import library_model
+    from rds.models.machine_axis import MachineParameters
+    from rds.models.stepper_axis import StepperParameters
+
+    for axis in machine.axes.values():
+        where = f"{machine.path}, [axis.{axis.name}"
+        if axis.model:
+            try:
+                library_model(**axis.model)
+            except InputError as error:
+                raise InputError(str(error), f"{where}.model]") from error
+        if axis.machine:
+            kind = StepperParameters if axis.module.get("motor") == "stepper" else MachineParameters
+            kind.from_table(axis.machine, f"{where}.machine]")
 
 
 def _show_verdict(judged: Verdict, json: bool, first: str = "") -> None:

@@ -82,6 +82,8 @@ def _quoted(text: str, said: str) -> str:
     found = re.search(r"at line (\d+)", said)
     line = text.split("\n")[int(found[1]) - 1].strip() if found else ""
     remedy = next((remedy for cause, remedy in _REMEDIES.items() if cause in said), "")
+    if "Cannot overwrite" in said and line.startswith("[axis."):
+        remedy = "; beside [axis.NAME] tables, `axes = [...]` takes the place of `axis = ...`, with one axis, too"
     return (f": `{line:.100}`" if line else "") + remedy
 
 

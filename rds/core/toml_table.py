@@ -108,7 +108,8 @@ class TomlTable:
     def slip(self, key: str) -> str:
         """A hint at a key that nobody has asked for and that may be meant to be `key`, which is missing."""
         tables = [self] if self._general is None else [self, self._general]
-        others = [name for table in tables for name in table.table if name not in table._asked]
+        known = self.declared.keys if self.declared is not None else ()
+        others = [name for table in tables for name in table.table if name not in table._asked and name not in known]
         close = get_close_matches(key, others, n=1)
         if close:
             return f"; is '{close[0]}' meant to be it?"

@@ -161,7 +161,10 @@ def _names(axes: Sequence[str] | None, segments: Sequence[Segment]) -> tuple[str
 def check_chain(segments: Sequence[Segment], T: float) -> None:
     """InputError for a segment that can't be interpolated, or that does not start where the one before ended."""
     for number, segment in enumerate(segments, start=1):
-        checked(segment, T)
+        try:
+            checked(segment, T)
+        except InputError as error:
+            raise InputError(f"segment {number}: {error}") if len(segments) > 1 else error from None
         if number > 1:
             end, start = segments[number - 2].end, segment.start
             if len(end) != len(start) or max(abs(a - b) for a, b in zip(end, start, strict=True)) > _GAP:

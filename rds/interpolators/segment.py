@@ -31,6 +31,8 @@ def checked(segment: Segment, T: float) -> Segment:
     if not (isfinite(segment.feed_rate) and segment.feed_rate > 0.0):
         raise InputError(f"feed_rate = {segment.feed_rate!r} mm/s must be a finite number above 0")
     if isinstance(segment, ArcSegment):
+        if not isinstance(segment.clockwise, bool | np.bool_):
+            raise InputError(f"{segment}: clockwise = {segment.clockwise!r} must be True or False")
         _check_arc(segment)
     return segment
 

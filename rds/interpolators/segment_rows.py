@@ -92,6 +92,7 @@ def point(value: Any, what: str, axes: int | None) -> tuple[float, ...]:
 def read_segments(path: str | Path) -> list[Segment]:
     """The path that a TOML file gives: `start`, `feed`, `feed_unit` (mm/min) and `[[segment]]` rows. InputError."""
     words = TomlTable.open(path, SEGMENTS)
+    check_known(words.table, ("start", "feed", "feed_unit", "segment"), str(path))
     for key in ("start", "feed"):
         if key not in words:
             raise InputError(
@@ -101,12 +102,9 @@ def read_segments(path: str | Path) -> list[Segment]:
     unit = words.read("feed_unit")
     rows = [dict(table.table) for table in words.tables("segment")]
     try:
-        made = segments_of(start, rows, _feed(feed, "feed"), unit)
+        return segments_of(start, rows, _feed(feed, "feed"), unit)
     except InputError as error:
         raise InputError(str(error), words.place()) from error
-    known = {"start", "feed", "feed_unit", "segment"}
-    check_known(words.table, known, str(path))
-    return made
 
 
 def _segment(here: tuple[float, ...], row: Mapping[str, Any], name: str, feed: float, unit: str) -> Segment:

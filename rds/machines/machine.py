@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rds.core.channel_name import channel_name
 from rds.core.errors import InputError
-from rds.core.quantities import Flag, Items, Quantity, Table, Text, near, shortened
+from rds.core.quantities import Choice, Flag, Items, Quantity, Table, Text, near, shortened
 from rds.core.shared_quantities import NODE, SAMPLE_PERIOD
 from rds.core.toml_table import TomlTable
 from rds.machines.link_table import LINKS, TOOL, WORK, ChainEnd, Link, read_links
@@ -34,6 +34,7 @@ DEFAULT_FEED = Quantity(
     "mm/min",
     above=0.0,
 )
+UNITS = ("mm", "deg", "rev/min")
 RESOLUTION = Quantity("of the encoder", "axis unit per count", above=0.0)
 PARAMETER = Quantity("parameter of the model")
 _LONGEST_NAME = 200  # characters; a longer one is no file's
@@ -53,7 +54,9 @@ AXIS = Table(
     "an axis of the machine",
     {
         "node": NODE,
-        "unit": Text('unit of its position; "rev/min" makes it a spindle: first order, its speed measured', "mm"),
+        "unit": Choice(
+            'unit of its position; "rev/min" makes it a spindle: first order, its speed measured', UNITS, "mm"
+        ),
         "travel": TRAVEL,
         "resolution": RESOLUTION,
         "model": Table(
@@ -293,6 +296,12 @@ def _axis(name: str, tables: TomlTable) -> Axis:
         slot=table.read("slot", None),
         power=table.read("power", None),
     )
+    if made.resolution > travel[1] - travel[0]:
+        raise InputError(
+            f"axis.{name}.resolution = {made.resolution:g} {made.unit} per count is more than all of its travel; it is "
+            f"not counts per {made.unit}, but the way of one count",
+            table.place("resolution"),
+        )
     if made.power is not None and not made.is_spindle:
         raise InputError(
             f"power is that of a spindle's motor, and {name} is none (unit {made.unit!r}); leave it out", table.path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from math import isfinite
 from pathlib import Path
 
@@ -12,6 +13,14 @@ from rds.core.errors import InputError
 from rds.core.limits import TABLE, read_limited
 
 COLUMNS = {2: "time,value", 4: "time,position,velocity,acceleration"}
+_UNIT = re.compile(r"[\[(]\s*(.*?)\s*[\])]|_(ms|us|ns|min|um|m|cm|mV|kV|in)$")  # "time [ms]", "time_ms"
+_UNITS = {  # that are the columns' own; rotary axes have degrees in place of mm, a spindle rev/min
+    "time": ("s", "sec", "seconds"),
+    "value": ("mm", "V", "deg", "°", "degrees", "rev/min", "rpm", "1/min"),
+    "position": ("mm", "deg", "°", "degrees", "rev/min", "rpm", "1/min"),
+    "velocity": ("mm/s", "deg/s", "°/s", "degrees/s", "rev/min/s"),
+    "acceleration": ("mm/s²", "mm/s^2", "mm/s2", "mm/s/s", "deg/s²", "deg/s^2", "deg/s2", "°/s²", "rev/min/s²"),
+}
 _LONGEST = 10_000  # characters of a line
 _ROUNDING = 1e-5  # of the largest value of a column: what five printed digits lose
 
@@ -75,6 +84,14 @@ def _check_header(cells: list[str], place: str) -> None:
         raise InputError(_wrong_columns(len(cells)), place)
     if not cells[0].lower().startswith("t"):
         raise InputError(f"the first column is {cells[0]!r}; it must be the time, as in {COLUMNS[len(cells)]!r}", place)
+    for cell, column in zip(cells, COLUMNS[len(cells)].split(","), strict=True):
+        found = _UNIT.search(cell)
+        unit = (found[1] or found[2]) if found else None
+        if unit and unit not in (own := _UNITS[column]):
+            raise InputError(
+                f"the column {cell!r} is in {unit}; give the {column} in {'mm or V' if column == 'value' else own[0]}",
+                place,
+            )
 
 
 def _row(cells: list[str], place: str) -> list[float]:

@@ -155,6 +155,7 @@ def test_what_is_wrong_is_named(alone: Path, change: str, line: int | None, said
     [
         (GOOD.replace("frequency", "freqency"), 10, "has no option 'freqency'; .*did you mean 'frequency'"),
         (GOOD.replace("[reference]", "[refrence]"), None, r"no \[reference\]; .*is 'refrence' meant to be it"),
+        (GOOD + "[axis.X.controller]\nname = 'p'\n", None, r"beside \[axis.NAME\] tables, `axes = \[...\]` takes"),
         (GOOD.replace("[controller]", "[controler]"), None, "is missing; .*is 'controler' meant to be it"),
         (GOOD.replace("gains", "gians"), 14, "has no option 'gians'; .*did you mean 'gains'"),
         (GOOD.replace("gains", "file"), 13, "name and file both say what to take; give one of them"),

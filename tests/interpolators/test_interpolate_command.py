@@ -137,6 +137,7 @@ def test_a_profile_takes_the_place_of_an_interpolator(tmp_path: Path) -> None:
     file.write_text(PROGRAM)
     for words, message in {
         "--line 0:5 --feed 600 --profile planned": "--profile is for a part program",
+        "path.toml --profile planned": "`profile` in [reference] of an experiment plans one",
         f"{file} --profile planned -m tustin": "--method is of interpolators, and --profile takes their place",
         f"{file} --profile planned --acceleration linear": "--acceleration is of interpolators",
         f"{file} --profile fast": "profile 'fast' is not one of planned, trapezoid, blended, point-to-point",
@@ -197,6 +198,7 @@ def test_faults_of_a_user_s_file_are_those_of_the_check(tmp_path: Path) -> None:
         ("--line 0,0:1,1 --arc 1,0:0,1:0,0 --feed 1", "--line and --arc were given"),
         ("--line 0,0:1,1", "needs a feed rate"),
         ("part.ngc --feed 100", "the program's word F"),
+        ("path.toml --feed 100", "`feed` of the path's file says its feed rate"),
         ("no_such.ngc", "there is no such part program"),
         ("--line 0,0 --feed 1", "needs two points or more"),
         ("--line 0,0:1,0 --feed 60 --period 1e-12", "makes 1e+12 samples of 1e-12 s, more than 2000000"),
@@ -209,6 +211,7 @@ def test_faults_of_a_user_s_file_are_those_of_the_check(tmp_path: Path) -> None:
         ("--line 0,0:1,1 --feed -3", "must be a number above 0"),
         ("--line 0,0:1,1 --feed 1 --clockwise", "--clockwise is for --arc"),
         ("--line 0,0:1,1 --feed 1 --tools t.tbl", "--tools is for a part program"),
+        ("--line 0,0:1,1:1,1e400 --feed 1", "segment 2: "),
         ("--arc 1,0:0,1 --feed 1", "needs start, end and centre"),
         ("--arc 1,0:0,1:0,0 --feed 1 --plane XW", "--plane 'XW' must be one of XY, ZX, YZ"),
         ("--arc 1,0:0,1:0,0 --feed 1 --plane ZX", "need 3 axes"),

@@ -79,7 +79,11 @@ def test_the_command_writes_what_a_program_takes(readings, tmp_path: Path) -> No
     told = CliRunner().invoke(app, words)
     assert told.exit_code == 0, told.output
     read = read_script(out.read_text())
-    assert [which for _, which, _ in read.changes] == [3, 3] and read.built
+    assert [which for _, which, _ in read.changes] == [3, 3] and read.built and not told.stderr
+    exchanged = tmp_path / "exchanged.csv"
+    exchanged.write_text(table.read_text().replace("tip_x", "tip_q").replace("tip_y", "tip_x").replace("_q", "_y"))
+    told = CliRunner().invoke(app, [*words[:3], str(exchanged)])
+    assert told.exit_code == 0 and "see whether columns are exchanged" in told.stderr
     table.write_text(table.read_text().replace("tip_z", "height", 1))
     told = CliRunner().invoke(app, [*words, "--force"])
     assert told.exit_code == 2 and "column 'height' is neither joint nor tip" in " ".join(told.output.split())

@@ -181,6 +181,9 @@ def test_one_motion_at_a_time(bench: Benches) -> None:
     rig.move(Move.START, Argument=5000)
     rig.run(0.1)
     assert rig.results() == [Result.ACCEPTED, Result.BUSY]
+    (busy,) = [each for each in rig.said("Reply") if each.fields.get("Result") == Result.BUSY]
+    # the host of the first motion hears it, too, and takes it for no end of that
+    assert acknowledgement(Acknowledges.START)(busy) and not acknowledgement(Acknowledges.START, last=True)(busy)
 
 
 @pytest.mark.parametrize("direction, start", [(1, 149.0), (0, -149.0)])

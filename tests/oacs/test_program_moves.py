@@ -123,6 +123,11 @@ def test_a_stop_at_the_end_of_a_program_is_no_hindrance(channel: str, tmp_path: 
         carried_out(tmp_path, "G21 G90\nG0 X2\nM0\nM2\n", mode="implementation", channel=channel)
 
 
+def test_a_bit_rate_is_a_number() -> None:
+    with pytest.raises(InputError, match="bitrate = '500k' must be a whole number from 10000"):
+        nodes_of(load_machine("mini-cnc"), options={"bitrate": "500k"})
+
+
 def test_modules_that_another_run_commands_are_left_alone(channel: str, tmp_path: Path) -> None:
     """By move commands, and by method A of modules on CAN."""
     cnc = load_machine("mini-cnc")

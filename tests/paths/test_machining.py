@@ -288,6 +288,12 @@ def test_faults_of_a_job_name_their_place(folder: Path, change: tuple[str, str],
     assert "job.toml" in str(caught.value)
 
 
+def test_a_drill_that_is_to_mill_is_told(folder: Path) -> None:
+    (folder / "job.toml").write_text(JOB.replace('layer = "pocket"\ntool = 1', 'layer = "pocket"\ntool = 2'))
+    cuts = read_job(folder / "job.toml").cuts
+    assert [any("drill, which cuts along its axis only" in note for note in cut.notes) for cut in cuts] == [0, 1, 0]
+
+
 def test_the_commands_list_layers_make_and_cut(folder: Path) -> None:
     run = CliRunner()
     found = json.loads(run.invoke(app, ["nc", "make", "job", str(folder / "plate.svg"), "--json"]).stdout)

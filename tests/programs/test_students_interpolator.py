@@ -113,6 +113,19 @@ def test_lines_and_arcs_have_interpolators_of_their_own(here: Path) -> None:
     assert rds.open_result("both").meta["program"]["interpolator"] == "linear, arcs by circular"
 
 
+def test_velocities_that_are_not_the_positions_are_told(here: Path) -> None:
+    """Which `tracking` feeds forward; and the jump from rest to 5 mm/s, which no difference between rows shows."""
+    words = {"segment": [{"kind": "line", "end": [2.0, 0.0]}], "acceleration": None}
+    right = circle(**words).run()
+    (here / "still.py").write_text(MINE.replace("[each / (samples * T) for each in way]", "[0.0] * len(way)"))
+    wrong = circle(interpolator="still.py", **words).run()
+    assert "still.py differ from the change of its positions, of X by 100% on average" in wrong.meta["notes"][-1]
+    assert not any("differ" in note for note in right.meta["notes"])
+    pulses = circle(interpolator="reference-pulse", **words).run()  # 2 or 3 BLU in a sample
+    assert not any("differ" in note for note in pulses.meta["notes"])
+    assert right.meta["program"]["limit_shares"]["X"]["acceleration"] == pytest.approx(5.0 / T / 200.0)
+
+
 def part() -> PartProgram:
     return PartProgram("part.ngc", interpolator="mine.py", acceleration="s-shape", sample_period=T)
 

@@ -93,7 +93,7 @@ def test_what_is_no_such_part_is_said(tmp_path: Path) -> None:
     builds = Builds()
     assert "there is no such file" in builds.check("controller", tmp_path / "none.py", 0.001).sentence
     model = write(tmp_path, "model.py", "def derivatives(t, x, u, params):\n    return [x[1], u[0]]\n")
-    assert "it holds a model, not a controller" in builds.check("controller", model, 0.001).sentence
+    assert "it holds a model and no controller" in builds.check("controller", model, 0.001).sentence
     rows = write(tmp_path, "rows.csv", "time,value\n0,1\n1,2\n0.5,3\n")
     (mark,) = builds.check("signal", rows, 0.001).marks
     assert mark.line == 4 and "times must increase" in mark.text

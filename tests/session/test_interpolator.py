@@ -123,6 +123,7 @@ def test_user_s_file_is_checked_first_and_its_fault_is_at_its_line(tmp_path: Pat
     ("name", "value", "why"),
     [
         ("start", "ten", "two or three positions in mm"),
+        ("end", "10,5 0", "write decimals with a point"),
         ("end", "nan, 0", "two or three positions in mm"),
         ("centre", "0, 1e400", "two or three positions in mm"),
         ("end", "", "two or three positions in mm"),
@@ -142,6 +143,14 @@ def test_a_part_program_without_a_name_is_asked_for(tmp_path: Path) -> None:
     panel = make(tmp_path, given="program")
     with pytest.raises(InputError, match=r"name the part program \(in .*\); the Program panel writes one"):
         run(panel)
+
+
+def test_what_a_check_warns_of_is_a_note(tmp_path: Path) -> None:
+    """As on the command line: velocities that are none of the positions."""
+    (tmp_path / "mine.py").write_text(USERS.replace("way / (n * T), np", "0.0 * way, np"))
+    panel = make(tmp_path, kind="linear", line_method="user", line_file="mine.py", end="5, 0", start="0, 0")
+    run(panel)
+    assert any(note.startswith("mine.py: ") and "differ from the change of position" in note for note in panel.notes)
 
 
 def test_arc_that_does_not_close_says_so(tmp_path: Path) -> None:

@@ -74,7 +74,10 @@ def blended(
         raise InputError(f"feed = {feed!r} mm/s and T = {T!r} s must each be more than 0")
     if not 0.0 < share <= 0.5:
         raise InputError(f"share = {share!r} must be more than 0 and at most 0.5 (of a move's deadline)")
-    through = np.array(points, dtype=float)
+    try:
+        through = np.array(points, dtype=float)
+    except (TypeError, ValueError):  # rows of different lengths, too
+        through = np.empty(0)
     if through.ndim != 2 or not np.isfinite(through).all():
         raise InputError("points must be rows of finite positions, one row for each point and one column for each axis")
     if len(feeds) not in (1, len(through) - 1):

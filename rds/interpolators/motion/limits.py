@@ -26,6 +26,8 @@ class Limits:
     @classmethod
     def of(cls, machine: Machine) -> Limits:
         """Those of a machine's axes that are called X, Y, Z, A, B or C. InputError for one without limits."""
+        if not hasattr(machine, "axes"):
+            raise InputError(f"{machine!r:.60} is no machine; load one, as in Limits.of(load_machine('mini-cnc'))")
         axes: dict[str, tuple[float, float, float]] = {}
         for name, axis in machine.axes.items():
             if name in AXES:

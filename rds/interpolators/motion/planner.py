@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from math import ceil, inf
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,7 +56,11 @@ def plan(
 
     Raises InputError, by line, for a segment that cannot be: a rate of 0, an axis without limits, a gap before it.
     """
-    if not T > 0.0:
+    if isinstance(blocks, np.ndarray) and blocks.dtype == SEGMENT:
+        raise InputError("the path is one block of several that a plan may take; hand it in as plan([path], limits, T)")
+    if not isinstance(limits, Limits):
+        raise InputError(f"limits = {limits!r:.60} must be Limits, as in Limits.of(load_machine('mini-cnc'))")
+    if not (isinstance(T, Real) and T > 0.0):
         raise InputError(f"sample period T = {T!r} must be more than 0 s")
     shown = _Shown(least_time)
     planner = _Planner(limits, T, tolerance, start, shown)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, inf
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,9 @@ def point_to_point(
     """
     with needed_for("a jerk-limited move in the least time"):
         import ruckig
+    for name, values in {"start": start, "end": end, "velocity": velocity, "acceleration": acceleration}.items():
+        _check_numbers(name, values)
+    _check_numbers("jerk", jerk)
     n = len(start)
     if n == 0 or not np.isfinite(start).all():
         raise InputError(f"start = {tuple(start)} must be a finite number for each axis, and one axis or more")
@@ -106,8 +110,19 @@ def point_to_point(
     return PointToPoint(T, position, speeds, pushes, float(found.duration))
 
 
+def _check_numbers(name: str, values: Any) -> None:
+    try:
+        is_row = np.ndim(np.asarray(values, dtype=float)) == 1
+    except (TypeError, ValueError):
+        is_row = False
+    if not is_row or isinstance(values, str):
+        raise InputError(f"{name} = {values!r:.60} must be a list of numbers, one for each axis, as in (0.0, 30.0)")
+
+
 def _state(name: str, values: Sequence[float] | None, most: Sequence[float]) -> list[float]:
     """The velocities or accelerations at an end. Raises InputError for those beyond the limits."""
+    if values is not None:
+        _check_numbers(name, values)
     found = [0.0] * len(most) if values is None else [float(value) for value in values]
     within = len(found) == len(most) and np.isfinite(found).all() and bool(np.all(np.abs(found) <= most))
     if not within:

@@ -6,7 +6,8 @@ the axis normal to the plane) moving in proportion.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from math import atan2, hypot, inf, pi
 
 import numpy as np
@@ -17,6 +18,7 @@ AXES = ("X", "Y", "Z", "A", "B", "C")
 LINE, XY, ZX, YZ = -1, 0, 1, 2  # planes
 EXACT_PATH, EXACT_STOP, BLEND = 0, 1, 2  # modes: G61, G61.1, G64
 JOINTS, MOVED, TILTED = 0, 1, 2  # of `tip`
+OFF_CIRCLE, OFF_SHARE = 0.06, 0.01  # mm; of the radius: beyond what the language allows, also after compensation
 FULL_CIRCLE = 1e-6  # rad; an arc shorter than this is a whole turn (LinuxCNC's CIRCLE_FUZZ)
 
 SEGMENT = np.dtype(
@@ -82,11 +84,12 @@ def arc(
 
     `clockwise` is seen from the positive end of the plane's normal; `turns` are whole turns more; an end that is seen
     from the centre where the start is, to FULL_CIRCLE, is a full circle. Raises InputError when start or end is on the
-    centre.
+    centre, or the end is off the circle by more than OFF_CIRCLE and OFF_SHARE.
     """
     row = _row(start, end, rate, mode, tolerance, 0.0, program_line)
     row["plane"] = plane
-    row["centre"][0, : len(centre)] = centre
+    with _numbers():
+        row["centre"][0, : len(centre)] = centre
     first, second, normal = in_plane(plane)
     a, b, c = row["start"][0], row["end"][0], row["centre"][0]
     from_centre = (a[first] - c[first], a[second] - c[second])
@@ -94,6 +97,12 @@ def arc(
     radius = hypot(*from_centre)
     if radius == 0.0 or hypot(*to_centre) == 0.0:
         raise InputError(f"an arc from {tuple(a)} to {tuple(b)} has its centre {tuple(c)} on an end; move the centre")
+    off = abs(hypot(*to_centre) - radius)
+    if off > OFF_CIRCLE and off > OFF_SHARE * radius:
+        raise InputError(
+            f"the end {tuple(end)} of an arc is {hypot(*to_centre):.4f} mm from its centre {tuple(centre)}, and its "
+            f"start {tuple(start)} is {radius:.4f} mm from it; an arc is given by start, end and centre, in this order"
+        )
     sign = -1.0 if clockwise else 1.0
     angle = atan2(to_centre[1], to_centre[0]) - atan2(from_centre[1], from_centre[0])
     sweep = (sign * angle) % (2 * pi)
@@ -154,6 +163,8 @@ def _turned(arm: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 def chain(*segments: np.ndarray) -> np.ndarray:
     """Segments one after the other, as one array."""
+    if any(getattr(each, "dtype", None) != SEGMENT for each in segments):
+        raise InputError("chain takes moves one by one, as in chain(line(...), arc(...)); of a list, chain(*moves)")
     return np.concatenate(segments) if segments else np.empty(0, SEGMENT)
 
 
@@ -167,8 +178,23 @@ def _row(
     program_line: int,
 ) -> np.ndarray:
     row = np.zeros(1, SEGMENT)
-    row["start"][0, : len(start)] = start
-    row["end"][0, : len(end)] = end
-    row["rate"], row["mode"], row["tolerance"], row["collinear"] = rate, mode, tolerance, collinear
-    row["line"] = program_line
+    with _numbers():
+        row["start"][0, : len(start)] = start
+        row["end"][0, : len(end)] = end
+        row["rate"], row["mode"], row["tolerance"], row["collinear"] = rate, mode, tolerance, collinear
+        row["line"] = program_line
+    if not (row["mode"][0] in (EXACT_PATH, EXACT_STOP, BLEND) and tolerance >= 0.0 and collinear >= 0.0):
+        said = f"mode = {mode!r}, tolerance = {tolerance!r} and collinear = {collinear!r} of a move"
+        raise InputError(f"{said}: the mode is 0 (G61), 1 (G61.1) or 2 (BLEND, G64), the others are at least 0 mm")
     return row
+
+
+@contextmanager
+def _numbers() -> Iterator[None]:
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            "a move has a start, an end and, of an arc, a centre, each of up to six positions (mm, degrees; of the "
+            f"centre three), then its rate in mm/s, and a mode that is a number, such as BLEND: {error}"
+        ) from None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, isfinite, sqrt
+from numbers import Real
 
 import numpy as np
 
@@ -31,6 +32,9 @@ def trapezoid(distance: float, feed: float, accel: float, T: float) -> Profile:
     It is a triangle where the distance is too short for the feed: v² = a·d. The last sample is at rest on the target.
     Raises InputError for a feed, acceleration or period that is not more than 0.
     """
+    for name, value in (("distance", distance), ("feed", feed), ("accel", accel), ("T", T)):
+        if not isinstance(value, Real):
+            raise InputError(f"{name} = {value!r:.60} must be a number; each axis has a profile of its own")
     for name, value, unit in (("feed", feed, "mm/s"), ("accel", accel, "mm/s²"), ("T", T, "s")):
         if not (isfinite(value) and value > 0.0):
             raise InputError(f"{name} = {value!r} must be more than 0 ({unit})")

@@ -87,6 +87,11 @@ def fit_force(force: np.ndarray, given: Mapping[str, np.ndarray], fixed: Mapping
     for name, value, half in zip(free, beta[1:], reach[1:], strict=True):
         values[name] = float(value)
         intervals[name] = (float(value - half), float(value + half))
+    if not values["feed"] > 0.0 and "feed" in free:
+        raise InputError(
+            f"the force falls as the feed rises (exponent {values['feed']:.3g}), which no cut does; see whether "
+            "columns are exchanged"
+        )
     spread = float(((y - y.mean()) ** 2).sum())
     r_squared = 1.0 - float(residual @ residual) / spread if spread else 1.0
     return ForceFit(values, intervals, tuple(fixed), float(np.sqrt(variance)), r_squared, len(y))

@@ -82,6 +82,11 @@ def _read(given: Mapping[str, Any]) -> dict[str, float]:
             f"width = {found['width']:g} mm is more than the tool's diameter of {found['diameter']:g} mm; "
             "a tool cuts no wider than it is"
         )
+    if found["feed"] > found["diameter"]:
+        raise InputError(
+            f"feed = {found['feed']:g} mm per tooth is more than the tool's diameter of {found['diameter']:g} mm; give "
+            "the way from tooth to tooth, not the feed rate"
+        )
     found.setdefault("engaged", degrees(acos(1.0 - 2.0 * found["width"] / found["diameter"])))
     return found
 

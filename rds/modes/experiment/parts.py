@@ -53,7 +53,10 @@ def make_model(words: TomlTable, setting: Setting) -> Model:
     given = words.any("model")
     default = dict(setting.axis.model)
     if given is None:
-        return library_model(default.pop("name"), **default)
+        try:
+            return library_model(default.pop("name"), **default)
+        except InputError as error:
+            raise InputError(str(error), f"[axis.{setting.axis.name}.model] of the machine's file") from error
     if isinstance(given, Model):
         return given
     if is_control_system(given):

@@ -160,6 +160,8 @@ def operate(kind: str, given: dict[str, Any], drawing: Drawing | None, tool: Sha
         cut.notes.append(
             f"the tool cuts along {tool.cutting_length:g} mm only, and goes {given['depth'] + given['top']:g} deep"
         )
+    if tool.shape == "drill" and kind != "drill":
+        cut.notes.append(f"tool {tool.number} is a drill, which cuts along its axis only; take a mill for a {kind}")
     _MAKERS[kind](cut, given, drawing, tolerance, owner)
     return cut
 

@@ -25,6 +25,8 @@ WAITS = {
     State.HOME: "homing_s",
 }
 _LINEAR = AXES[:3]
+_DISAGREEMENT = 0.2  # of velocities and positions, of the way: well above what a corner makes
+_SAMPLES = 50  # over which they are compared: positions in whole BLU go by jumps
 
 
 def judged(result: Result, prepared: Prepared) -> Result:
@@ -70,7 +72,8 @@ def judged(result: Result, prepared: Prepared) -> Result:
             )
         },
     }
-    meta = result.meta | {"program": about, "notes": [*result.meta.get("notes", []), *prepared.notes]}
+    notes = [*result.meta.get("notes", []), *prepared.notes, *_disagreement(result, prepared)]
+    meta = result.meta | {"program": about, "notes": notes}
     return Result(columns, units, meta)
 
 
@@ -171,19 +174,42 @@ def _share_done(result: Result, prepared: Prepared) -> float:
 def _limit_shares(result: Result, prepared: Prepared) -> dict[str, dict[str, float]]:
     """Of each axis the largest velocity, acceleration and jerk that was sent, by differences, over its limit.
 
-    Where samples were discarded there are no differences.
+    The axes stand before the first sample, and after the last one of a path that was gone to its end. Where samples
+    were discarded there are no differences.
     """
     program, T = prepared.program, prepared.T
-    whole = np.diff(np.rint(result["time"] / T)) == 1
+    rest = (3, 3 if result.meta.get("ending") == "done" else 0)  # samples at rest before and after
+    whole = np.pad(np.diff(np.rint(result["time"] / T)) == 1, rest, constant_values=True)
     shares: dict[str, dict[str, float]] = {name: {} for name in program.axes}
     for order, kind in enumerate(("velocity", "acceleration", "jerk"), 1):
-        known = np.ones(max(len(result) - order, 0), dtype=bool)
+        known = np.ones(max(len(result) + sum(rest) - order, 0), dtype=bool)
         for i in range(order):
             known &= whole[i : i + len(known)]
         for name, limit in zip(program.axes, program.limits[order - 1], strict=True):
-            sent = np.abs(np.diff(result[f"{name}_reference"], order))[known] / T**order
+            sent = np.abs(np.diff(np.pad(result[f"{name}_reference"], rest, "edge"), order))[known] / T**order
             shares[name][kind] = float(sent.max(initial=0.0) / limit)
     return shares
+
+
+def _disagreement(result: Result, prepared: Prepared) -> list[str]:
+    """A note where an interpolator's velocities are not those of its positions: laws feed them forward."""
+    if not isinstance(prepared.program, InterpolatedProgram):
+        return []
+    follows = np.diff(np.rint(result["time"] / prepared.T)) == 1  # no sample is missing before it
+    parts = np.arange(0, int(follows.sum()), _SAMPLES)
+    if not len(parts):
+        return []
+    for name in prepared.program.axes:
+        gone = np.add.reduceat(np.diff(result[f"{name}_reference"])[follows] / prepared.T, parts)
+        told = np.add.reduceat(result[f"{name}_reference_velocity"][1:][follows], parts)
+        share = float(np.abs(told - gone).sum() / max(np.abs(gone).sum(), 1e-9))
+        if share > _DISAGREEMENT:
+            return [
+                f"The velocities of the interpolator {prepared.about['interpolator']} differ from the change of its "
+                f"positions, of {name} by {share:.0%} on average: a controller that feeds velocity forward pushes the "
+                "wrong way. Let it yield (position, velocity, acceleration) in mm, mm/s and mm/s²."
+            ]
+    return []
 
 
 def _worst(values: np.ndarray, line: np.ndarray, time: np.ndarray, unit: str) -> dict[str, Any]:

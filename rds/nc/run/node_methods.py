@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rds.bus.hub.bus_settings import DEFAULT_BAUD
+from rds.bus.hub.bus_settings import BITRATE, DEFAULT_BAUD
 from rds.core.errors import InputError
 from rds.core.progress import Progress
 from rds.core.shared_quantities import SAMPLE_PERIOD
@@ -52,7 +52,7 @@ def nodes_of(machine: Machine, baud: float | None = None, options: Mapping[str, 
         raise InputError(f"--baud is of a serial line, and {machine.name} is on CAN: give --option bitrate=500000")
     words = dict(options or {})
     period = SAMPLE_PERIOD.check(words.pop("period", machine.sample_period), "period")
-    bitrate = words.pop("bitrate", can_methods.BITRATE)
+    bitrate = BITRATE.check(words.pop("bitrate", can_methods.BITRATE), "bitrate")
     carry_out = partial(can_methods.run_can_method, bitrate=bitrate)
     return Nodes(can_methods.METHODS, period, False, {"bitrate": bitrate, "period": period}, carry_out, words)
 

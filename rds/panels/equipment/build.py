@@ -129,7 +129,7 @@ def _python(role: str, path: Path, text: str, T: float, pulse: Callable[[], None
     marks += [_mark(_words(warning), path, text, fault=False) for warning in report.warnings]
     if role not in report.interfaces and not marks:
         what = " and ".join(report.interfaces)
-        marks.append(Mark(None, f"it holds a {what}, not a {role}; name the file of your {role}"))
+        marks.append(Mark(None, f"it holds a {what} and no {role}; name the file of your {role}"))
     return Checked(role, path, text, tuple(marks), tuple(notes))
 
 

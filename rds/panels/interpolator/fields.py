@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -30,6 +31,9 @@ ROWS = {  # to begin with, by what is interpolated
     "circular": [{"kind": ARC, "end": [30.0, 0.0], "centre": [20.0, 0.0]}, _HALF_CIRCLE],
     "both": [_STRAIGHT, _HALF_CIRCLE],
 }
+
+
+_DECIMAL_COMMA = re.compile(r"\d,\d")
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,8 @@ def read_point(text: str) -> list[float]:
         values = [float(cell) for cell in text.replace(",", " ").split()]
     except ValueError:
         values = []
+    if len(text.split()) > 1 and _DECIMAL_COMMA.search(text):
+        raise InputError(f"write decimals with a point, as in 10.5, 0: {text!r:.60} may be two positions or three")
     if not 2 <= len(values) <= 3 or not all(map(isfinite, values)) or "_" in text:
         raise InputError(
             f"write two or three positions in mm with a comma between them, such as 10, 0; not {text!r:.60}"

@@ -139,12 +139,16 @@ class Interpolating:
             if files:
                 task.note = "checking your file"
                 self.builds.require([("interpolator", file) for file in files], T, task.pulse)
+                for file in files:
+                    found = self.builds.check("interpolator", file, T, task.pulse)
+                    self.notes += [f"{file.name}: {mark.text}" for mark in found.marks]  # warnings
             if program is not None and program.suffix == PATH:
                 path = read_segments(program)
                 self._check_kinds(path)
             elif program is not None:
                 task.note = "reading the program"
-                path, rests, self.notes = read_program(program, machine, T)
+                path, rests, notes = read_program(program, machine, T)
+                self.notes += notes
                 self._check_kinds(path)
             task.note = "interpolating"
             methods = {role: stoppable(self._interpolator(role, chosen), task) for role in self.roles}

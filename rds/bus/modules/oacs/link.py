@@ -12,7 +12,7 @@ import can
 from rds.bus.modules.oacs import messages, talk
 from rds.bus.modules.oacs.codes import Acknowledges, Code, MessageToHost, Move, Parameter, Result, check_node
 from rds.bus.modules.oacs.messages import Decoded
-from rds.bus.modules.oacs.refusals import reason
+from rds.bus.modules.oacs.refusals import REFUSED, reason
 from rds.core.errors import MachineError
 
 PATIENCE = 0.5  # s for a module to say a word
@@ -125,7 +125,8 @@ class Conversation:
 def acknowledgement(answers: Acknowledges, last: bool = False) -> Callable[[Decoded], bool]:
     """Whether a message acknowledges that command; with `last`, as its end.
 
-    A module that does not know the command at all refuses it under a number of its own, at once.
+    A module that does not know the command at all refuses it under a number of its own, at once. What is refused while
+    an accepted command is under way is the same command of another host.
     """
     known = {answers} if last else {answers, Acknowledges.UNKNOWN}
 
@@ -135,7 +136,7 @@ def acknowledgement(answers: Acknowledges, last: bool = False) -> Callable[[Deco
             message.kind == "Reply"
             and fields["Code"] == MessageToHost.ACKNOWLEDGEMENT
             and fields["Acknowledges"] in known
-            and not (last and fields["Result"] == Result.ACCEPTED)
+            and not (last and fields["Result"] in (Result.ACCEPTED, *REFUSED))
         )
 
     return wanted

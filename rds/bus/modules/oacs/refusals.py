@@ -21,6 +21,11 @@ REASONS = {
     Result.NOTHING_MOVES: "nothing moves; start a motion first",
 }
 
+# what a module answers at once, and never at the end of a motion that it has accepted
+REFUSED = frozenset(
+    {Result.OUTSIDE_TRAVEL, Result.BAD_VALUE, Result.NOT_FOR_THIS_MODULE, Result.BUSY, Result.NOTHING_MOVES}
+)
+
 
 def reason(result: int) -> str:
     """The sentence for a result that is not a success."""

@@ -21,7 +21,7 @@ from rds.bus.modules.oacs.link import PATIENCE, acknowledgement
 from rds.bus.modules.oacs.messages import Decoded, Frame
 from rds.bus.modules.oacs.module import OacsModule
 from rds.bus.modules.oacs.pid import FIELDS
-from rds.bus.modules.oacs.refusals import reason
+from rds.bus.modules.oacs.refusals import REFUSED, reason
 from rds.core.errors import MachineError
 
 _KEEP_ALIVE = 0.5  # s; modules end a motion when they hear nothing for 2 s
@@ -143,7 +143,7 @@ class Several:
                 elif result == Result.CARRIED_OUT:
                     found[number] = Arrived(counts, self.port.now() - asked)
                     left.discard(number)
-                else:
+                elif not (number in accepted and result in REFUSED):  # else it refused another host
                     self._fail(number, f"was told to move to {targets[number]:g}: {reason(result)}")
         return found
 
