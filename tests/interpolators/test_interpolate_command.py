@@ -235,7 +235,7 @@ def test_refusals(words: str, said: str) -> None:
 def test_the_commands_of_the_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("part.ngc").write_text(PROGRAM)
-    Path("my_interpolator.py").write_text(GOOD)
+    Path("my_interpolator.py").write_text((ROOT / "examples" / "my_interpolator.py").read_text(encoding="utf-8"))
     text = (ROOT / "docs" / "interpolation.md").read_text(encoding="utf-8")
     table = re.search(r"```toml\n(.*?)```", text, re.DOTALL)
     assert table is not None

@@ -71,7 +71,7 @@ def test_an_interpolator_that_never_yields_is_stopped(tmp_path: Path, monkeypatc
     work = Interpolating(Session(tmp_path))
     work.choices.set("arc_method", "user")
     work.choices.set("arc_file", "mine.py")
-    monkeypatch.setattr(work.builds, "require", lambda *_: None)
+    monkeypatch.setattr(work.builds, "require", lambda *_: [])
     task = work.run()
     begun(lambda: task.note == "interpolating")
     task.stop()

@@ -93,11 +93,12 @@ def check_assignment(
     pool: Opener,
     seeds: int = SEEDS,
     progress: Progress | None = None,
+    audited: bool = True,
     announce: Callable[[str], None] = lambda text: None,
 ) -> AssignmentCheck:
     """Grade the reference solution for `seeds` students, and what does nothing. InputError without a solution.
 
-    Work is counted for `WORK_SEEDS` of them. Where it has no fault, honest designs and cheats are tried as well,
+    Work is counted for `WORK_SEEDS` of them. Where it is `audited`, honest designs and cheats are tried as well,
     which takes a minute and more: `announce` gets a sentence before each.
     """
     solution = assignment.path(assignment.solution)
@@ -122,7 +123,7 @@ def check_assignment(
     if progress:
         progress(seeds + 1, seeds + 1)
     _notes(assignment, found)
-    if not found.faults:  # else the designs would be blamed for what the solution is
+    if audited and not found.faults:  # else the designs would be blamed for what the solution is
         faults, notes = audit(assignment, pool, grades[0], announce)
         found.faults += faults
         found.notes += notes

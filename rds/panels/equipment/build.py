@@ -89,12 +89,14 @@ class Builds:
         T: float,
         pulse: Callable[[], None] = lambda: None,
         axes: int = 0,
-    ) -> None:
-        """InputError naming the first file that will not do; `pulse` and `axes` as in `check`."""
+    ) -> list[Checked]:
+        """What was found, where all files will do; InputError naming the first that won't. Else as `check`."""
+        found = []
         for role, path in files:
-            checked = self.check(role, path, T, pulse, axes)
-            if not checked.ok:
-                raise InputError(checked.sentence)
+            found.append(self.check(role, path, T, pulse, axes))
+            if not found[-1].ok:
+                raise InputError(found[-1].sentence)
+        return found
 
 
 def _checked(role: str, path: Path, text: str, T: float, pulse: Callable[[], None], axes: int) -> Checked:

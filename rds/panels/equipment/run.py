@@ -47,7 +47,7 @@ class EquipmentRun:
         session: Session,
         table: dict[str, Any],
         title: str | None = None,
-        prepare: Callable[[Callable[[], None]], None] | None = None,
+        prepare: Callable[[Callable[[], None]], object] | None = None,
     ):
         mode = str(table.get("mode", DEFAULT))
         self.session, self.table = session, table

@@ -138,10 +138,8 @@ class Interpolating:
             path = segments
             if files:
                 task.note = "checking your file"
-                self.builds.require([("interpolator", file) for file in files], T, task.pulse)
-                for file in files:
-                    found = self.builds.check("interpolator", file, T, task.pulse)
-                    self.notes += [f"{file.name}: {mark.text}" for mark in found.marks]  # warnings
+                found = self.builds.require([("interpolator", file) for file in files], T, task.pulse)
+                self.notes += [f"{each.path.name}: {mark.text}" for each in found for mark in each.marks]  # warnings
             if program is not None and program.suffix == PATH:
                 path = read_segments(program)
                 self._check_kinds(path)

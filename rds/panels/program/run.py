@@ -40,7 +40,7 @@ class ProgramWork(EquipmentRun):
         setup: Setup,
         controller: Any,
         changes: list[tuple[float, str, float]],
-        prepare: Callable[[Callable[[], None]], None] | None = None,
+        prepare: Callable[[Callable[[], None]], object] | None = None,
         motion: Mapping[str, Any] | None = None,
     ):
         """`motion` is what `PartProgram` is told of an interpolator, or of a run in part; else nothing."""
