@@ -16,8 +16,8 @@ COLUMNS = {2: "time,value", 4: "time,position,velocity,acceleration"}
 _UNIT = re.compile(r"[\[(]\s*(.*?)\s*[\])]|_(ms|us|ns|min|um|m|cm|mV|kV|in)$")  # "time [ms]", "time_ms"
 _UNITS = {  # that are the columns' own; rotary axes have degrees in place of mm, a spindle rev/min
     "time": ("s", "sec", "seconds"),
-    "value": ("mm", "V", "deg", "°", "degrees", "rev/min", "rpm", "1/min"),
-    "position": ("mm", "deg", "°", "degrees", "rev/min", "rpm", "1/min"),
+    "value": ("mm", "V", "deg", "°", "degree", "degrees", "rev/min", "rpm", "1/min"),
+    "position": ("mm", "deg", "°", "degree", "degrees", "rev/min", "rpm", "1/min"),
     "velocity": ("mm/s", "deg/s", "°/s", "degrees/s", "rev/min/s"),
     "acceleration": ("mm/s²", "mm/s^2", "mm/s2", "mm/s/s", "deg/s²", "deg/s^2", "deg/s2", "°/s²", "rev/min/s²"),
 }
@@ -89,7 +89,8 @@ def _check_header(cells: list[str], place: str) -> None:
         unit = (found[1] or found[2]) if found else None
         if unit and unit not in (own := _UNITS[column]):
             raise InputError(
-                f"the column {cell!r} is in {unit}; give the {column} in {'mm or V' if column == 'value' else own[0]}",
+                f"the column {cell!r} is in {unit}; give the {column} in "
+                f"{'mm or V' if column == 'value' else own[0]}, and no other word in its brackets",
                 place,
             )
 

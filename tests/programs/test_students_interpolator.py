@@ -123,6 +123,9 @@ def test_velocities_that_are_not_the_positions_are_told(here: Path) -> None:
     assert not any("differ" in note for note in right.meta["notes"])
     pulses = circle(interpolator="reference-pulse", **words).run()  # 2 or 3 BLU in a sample
     assert not any("differ" in note for note in pulses.meta["notes"])
+    slant = {"segment": [{"kind": "line", "end": [2.0, 0.004]}], "acceleration": None}  # Y moves by no whole BLU
+    still = circle(interpolator="reference-pulse", **slant).run()
+    assert not any("differ" in note for note in still.meta["notes"])
     assert right.meta["program"]["limit_shares"]["X"]["acceleration"] == pytest.approx(5.0 / T / 200.0)
 
 

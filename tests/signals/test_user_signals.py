@@ -141,6 +141,7 @@ def test_rows_to_either_side_of_the_peak_of_an_acceleration_belong_together(tmp_
         ("0,1,2\n", 1, "3 columns; it needs time,value or"),
         ("0;1\n1;2\n", 1, "1 column; it needs"),
         ("time [ms],value\n0,1\n500,2\n", 1, "the column 'time [ms]' is in ms; give the time in s"),
+        ("time,value (desired)\n0,1\n1,2\n", 1, "give the value in mm or V, and no other word in its brackets"),
         ("time_s,value (m)\n0,1\n1,2\n", 1, "the column 'value (m)' is in m; give the value in mm or V"),
         ("t,p,v [mm/s],a [m/s²]\n0,0,0,0\n1,0,0,0\n", 1, "give the acceleration in mm/s²"),
         ("value,time\n1,0\n", 1, "the first column is 'value'"),

@@ -90,7 +90,7 @@ def fit_force(force: np.ndarray, given: Mapping[str, np.ndarray], fixed: Mapping
     if not values["feed"] > 0.0 and "feed" in free:
         raise InputError(
             f"the force falls as the feed rises (exponent {values['feed']:.3g}), which no cut does; see whether "
-            "columns are exchanged"
+            "columns are exchanged; if not, vary the feed more, or fix its exponent (--fix feed=1)"
         )
     spread = float(((y - y.mean()) ** 2).sum())
     r_squared = 1.0 - float(residual @ residual) / spread if spread else 1.0

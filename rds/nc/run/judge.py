@@ -26,7 +26,7 @@ WAITS = {
 }
 _LINEAR = AXES[:3]
 _DISAGREEMENT = 0.2  # of velocities and positions, of the way: well above what a corner makes
-_SAMPLES = 50  # over which they are compared: positions in whole BLU go by jumps
+_SAMPLES, _JUMP = 50, 0.01  # over which they are compared; mm: positions in whole BLU go by jumps, or stand
 
 
 def judged(result: Result, prepared: Prepared) -> Result:
@@ -200,9 +200,10 @@ def _disagreement(result: Result, prepared: Prepared) -> list[str]:
     if not len(parts):
         return []
     for name in prepared.program.axes:
-        gone = np.add.reduceat(np.diff(result[f"{name}_reference"])[follows] / prepared.T, parts)
-        told = np.add.reduceat(result[f"{name}_reference_velocity"][1:][follows], parts)
-        share = float(np.abs(told - gone).sum() / max(np.abs(gone).sum(), 1e-9))
+        steps = np.diff(result[f"{name}_reference"])[follows]
+        told = result[f"{name}_reference_velocity"][1:][follows] * prepared.T
+        off = np.abs(np.add.reduceat(told - steps, parts))
+        share = float(off[off > _JUMP].sum() / max(np.abs(steps).sum(), _JUMP))
         if share > _DISAGREEMENT:
             return [
                 f"The velocities of the interpolator {prepared.about['interpolator']} differ from the change of its "
