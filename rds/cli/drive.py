@@ -32,7 +32,7 @@ def setup(
     ),
     node: Node = None,
     axis: Annotated[str, typer.Option(help="What the axis is to be called.")] = "X",
-    unit: Annotated[str, typer.Option(help="mm or degree.")] = "mm",
+    unit: Annotated[str, typer.Option(help="mm or deg.")] = "mm",
     lead: Annotated[float, typer.Option(help="mm (degrees) per revolution of the drive's shaft.", min=1e-9)] = 1.0,
     counts: Annotated[
         float | None, typer.Option(help="Position units per mm (degree), where the drive's objects do not say them.")
@@ -72,6 +72,9 @@ def setup(
             raise InputError(f"--direction {direction} must be 1 or -1")
         if mode not in (None, "csp", "csv", "cst", "pp"):
             raise InputError(f"--mode {mode} must be csp, csv, cst or pp")
+        unit = "deg" if unit in ("degree", "degrees", "°") else unit
+        if unit not in ("mm", "deg"):
+            raise InputError(f"--unit {unit} must be mm or deg")
         if out.suffix != ".toml":
             raise InputError(f"--out {out} must end with .toml")
         sine, steps = (out.with_name(f"{out.stem}-{motion}.toml") for motion in ("sine", "steps"))
