@@ -72,6 +72,7 @@ def setup(
             raise InputError(f"--direction {direction} must be 1 or -1")
         if mode not in (None, "csp", "csv", "cst", "pp"):
             raise InputError(f"--mode {mode} must be csp, csv, cst or pp")
+        unit = "deg" if unit in ("degree", "degrees", "°") else unit
         if unit not in ("mm", "deg"):
             raise InputError(f"--unit {unit} must be mm or deg")
         if out.suffix != ".toml":

@@ -13,10 +13,11 @@ from rds.core.errors import InputError
 from rds.core.limits import TABLE, read_limited
 
 COLUMNS = {2: "time,value", 4: "time,position,velocity,acceleration"}
-_UNIT = re.compile(r"[\[(]\s*(.*?)\s*[\])]|_(ms|us|ns|min|um|m|cm|mV|kV|in)$")  # "time [ms]", "time_ms"
+# "time [ms]", "time_ms", "t/ms"; but v_in and u_min have an index
+_UNIT = re.compile(r"[\[(]\s*(.*?)\s*[\])]|(?:_|/\s*)(ms|us|µs|ns|um|µm|cm|mV|kV)$|(?:^t|[^_]{3,})_(m|min)$")
 _UNITS = {  # that are the columns' own; rotary axes have degrees in place of mm, a spindle rev/min
-    "time": ("s", "sec", "seconds"),
-    "value": ("mm", "V", "deg", "°", "degree", "degrees", "rev/min", "rpm", "1/min"),
+    "time": ("s", "sec", "second", "seconds"),
+    "value": ("mm", "v", "volt", "volts", "deg", "°", "degree", "degrees", "rev/min", "rpm", "1/min"),
     "position": ("mm", "deg", "°", "degree", "degrees", "rev/min", "rpm", "1/min"),
     "velocity": ("mm/s", "deg/s", "°/s", "degrees/s", "rev/min/s"),
     "acceleration": ("mm/s²", "mm/s^2", "mm/s2", "mm/s/s", "deg/s²", "deg/s^2", "deg/s2", "°/s²", "rev/min/s²"),
@@ -86,11 +87,11 @@ def _check_header(cells: list[str], place: str) -> None:
         raise InputError(f"the first column is {cells[0]!r}; it must be the time, as in {COLUMNS[len(cells)]!r}", place)
     for cell, column in zip(cells, COLUMNS[len(cells)].split(","), strict=True):
         found = _UNIT.search(cell)
-        unit = (found[1] or found[2]) if found else None
-        if unit and unit not in (own := _UNITS[column]):
+        unit = (found[1] or found[2] or found[3]) if found else None
+        if unit and unit.lower() not in (own := _UNITS[column]):
             raise InputError(
-                f"the column {cell!r} is in {unit}; give the {column} in "
-                f"{'mm or V' if column == 'value' else own[0]}, and no other word in its brackets",
+                f"the column {cell!r} is in {unit}; give the {column} in {'mm or V' if column == 'value' else own[0]}, "
+                "and a heading with that unit or none",
                 place,
             )
 

@@ -165,6 +165,18 @@ def test_a_rotary_axis_alone_is_held_back_by_its_feed_or_its_limits() -> None:
     assert any("degrees/s" in said for said in found.savings())
 
 
+def test_what_holds_nothing_back_is_refused() -> None:
+    with pytest.raises(InputError, match="nothing in it moves"):
+        explained([], Limits.of(load_machine("mini-cnc")), 0.001)
+    with pytest.raises(InputError, match="nothing in it moves"):
+        explained([PathBlock(chain())], Limits.of(load_machine("mini-cnc")), 0.001)
+
+
+def test_a_program_that_only_dwells_has_a_certificate(tmp_path: Path) -> None:
+    prepared = prepare(program(tmp_path, "G21\nG4 P1\nM2\n"), load_machine("mini-cnc"))
+    assert len(certificate_picture(prepared).axes) == 4
+
+
 def test_the_certificate_of_a_run_shows_what_holds_it_back(tmp_path: Path) -> None:
     """Speeds along the path and their causes above the shares of the limits; as the cycle time's picture does."""
     part = program(tmp_path, "G21 G90 G94\nG0 X25\nX-25\nM8\nG4 P0.5\nX25\nX-25\nG1 X-15 F600\nM2\n")

@@ -11,9 +11,9 @@ from oacs_bench import MACHINE
 from typer.testing import CliRunner
 
 from rds.bus.hub.command import Command, commanded
-from rds.bus.modules.oacs.codes import Acknowledges, Kind
+from rds.bus.modules.oacs.codes import Acknowledges, Code, Kind, Move
 from rds.bus.modules.oacs.link import acknowledgement
-from rds.bus.modules.oacs.messages import Decoded, Frame, decode
+from rds.bus.modules.oacs.messages import Decoded, Frame, decode, encode
 from rds.bus.modules.oacs.module import OacsModule
 from rds.bus.modules.oacs.module_data import read_modules
 from rds.bus.modules.oacs.several import Several, VirtualPort
@@ -177,6 +177,33 @@ def test_axes_that_stand_off_the_start_are_told_before_anything_moves() -> None:
     bench.host.to({data["Z"].node: 0.0}, 60.0)
     with pytest.raises(MachineError, match=r"^X stands at 3"):
         require_start(bench.host, data, start)
+
+
+def test_another_hosts_motion_that_began_at_the_same_time_is_not_taken_for_ours() -> None:
+    """X went to 10 mm for the other host, and `to` 2 mm returned as if it had arrived; the drill likewise."""
+    bench, node = Bench(), DATA["X"].node
+    bench.port.send(encode("Command", node, Code=Code.MOVE, Move=Move.TO_POINT, Argument=10_000))
+    with pytest.raises(MachineError, match="X was told to move to 2: it is in motion"):
+        bench.host.to({node: 2.0}, 60.0)
+    drill = next(data.node for data in DATA.values() if data.kind == Kind.TOOL)
+    bench.port.send(encode("Command", drill, Code=Code.MOVE, Move=Move.START, Direction=1, Argument=200_000))
+    with pytest.raises(MachineError, match="it is in motion"):
+        bench.host.turn(drill, 300.0)
+        bench.host.rest(1.0)
+
+
+def test_what_is_refused_later_is_another_hosts() -> None:
+    bench, node = Bench(), DATA["X"].node
+    disturbed = []
+
+    def disturb(at: float, message: Decoded) -> None:
+        if at > 2.0 and not disturbed:
+            disturbed.append(at)
+            bench.port.send(encode("Command", node, Code=Code.MOVE, Move=Move.TO_POINT, Argument=1_000))
+
+    bench.host.listen = disturb
+    bench.host.to({node: 10.0}, 60.0)
+    assert disturbed and bench.modules["X"].plant.true_position == pytest.approx(10.0, abs=0.6)
 
 
 def test_a_tool_turns_at_its_speed_until_it_is_stopped() -> None:

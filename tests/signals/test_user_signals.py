@@ -141,9 +141,10 @@ def test_rows_to_either_side_of_the_peak_of_an_acceleration_belong_together(tmp_
         ("0,1,2\n", 1, "3 columns; it needs time,value or"),
         ("0;1\n1;2\n", 1, "1 column; it needs"),
         ("time [ms],value\n0,1\n500,2\n", 1, "the column 'time [ms]' is in ms; give the time in s"),
-        ("time,value (desired)\n0,1\n1,2\n", 1, "give the value in mm or V, and no other word in its brackets"),
+        ("time,value (desired)\n0,1\n1,2\n", 1, "give the value in mm or V, and a heading with that unit or none"),
         ("time_s,value (m)\n0,1\n1,2\n", 1, "the column 'value (m)' is in m; give the value in mm or V"),
         ("t,p,v [mm/s],a [m/s²]\n0,0,0,0\n1,0,0,0\n", 1, "give the acceleration in mm/s²"),
+        ("t/ms,u/V\n0,1\n500,2\n", 1, "the column 't/ms' is in ms; give the time in s"),
         ("value,time\n1,0\n", 1, "the first column is 'value'"),
         ("0,0,1,0\n1,1,1,0\n2,5,1,0\n", 3, "must belong together"),
         ("0,0,0,0\n1,0.5,1,0\n2,2,2,0\n", 2, "must belong together"),
@@ -186,3 +187,9 @@ def test_bad_options_are_refused(options, fault):
     with pytest.raises(InputError) as error:
         user(**options)
     assert fault in str(error.value)
+
+
+@pytest.mark.parametrize("heading", ["t,v_in", "t,u_min", "t,x_m", "Time [S],Value [MM]", "t (s),u (v)", "t/s,u/V"])
+def test_an_index_and_capitals_in_a_heading_are_no_other_unit(tmp_path, heading):
+    file = write(tmp_path, heading + "\n0,1\n1,2\n")
+    assert sample(make_signal("user", file=str(file)), 0.5, 3).position.tolist() == [1.0, 1.5, 2.0]

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rds.core.errors import InputError
 from rds.core.progress import Progress
 from rds.interpolators.motion.least_time import LeastTime
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.pieces import BEND, DISTANCE, RATIO, SLOPE, TWIST
 from rds.interpolators.motion.planner import plan
-from rds.interpolators.motion.segments import AXES, LINE
+from rds.interpolators.motion.segments import AXES, LINE, SEGMENT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -115,7 +116,9 @@ def limiting(blocks: Sequence[Any], limits: Limits, T: float) -> Limiting:
     """Plan the motion, and tell for each sample what holds it back. All samples are kept: some 200 bytes each."""
     pieces = _Pieces(limits, T)
     samples = list(plan(blocks, limits, T, start=np.zeros(6), least_time=pieces))
-    path = np.concatenate([block.segments for block in blocks])
+    path = np.concatenate([block.segments for block in blocks]) if blocks else np.empty(0, SEGMENT)
+    if not len(path):
+        raise InputError("nothing in it moves, so nothing holds it back")
     position = np.concatenate([block.position for block in samples])
     segment = np.concatenate([block.segment for block in samples]).clip(0, len(path) - 1)
     padded = np.concatenate((np.repeat(position[:1], 3, axis=0), position))

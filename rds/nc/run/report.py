@@ -116,7 +116,7 @@ def certificate_picture(prepared: Prepared) -> Any:
 
     certificate = prepared.certificate
     assert certificate is not None
-    if certificate.least_time is None:
+    if certificate.least_time is None or not len(prepared.path):
         return certificate.plot()
     whole = PathBlock(prepared.path, list(prepared.events))
     looked_for = ASKED if prepared.seconds <= LOOKED_AT else 0

@@ -88,7 +88,7 @@ class Conversation:
         """
         asked = time.monotonic()
         with self._stopping():
-            heard = self.wait_for(acknowledgement(answers, last=True), what, seconds)
+            heard = self.wait_for(acknowledgement(answers, True, _within(PATIENCE)), what, seconds)
         result, counts = Result(heard.message.fields["Result"]), heard.message.fields["AcknowledgePosition"]
         if result not in also:
             raise MachineError(f"{self.name} was told {what} and did not finish: {reason(result)}")
@@ -97,7 +97,7 @@ class Conversation:
     def hold(self, what: str, answers: Acknowledges, seconds: float) -> None:
         """Let an accepted command that has no end of its own go on for `seconds`. MachineError if it ends before."""
         with self._stopping():
-            heard = self._hear(acknowledgement(answers, last=True), seconds)
+            heard = self._hear(acknowledgement(answers, True, _within(PATIENCE)), seconds)
         if heard is not None:
             ended = Result(heard.message.fields["Result"])
             raise MachineError(f"{self.name} was told {what} and did not go on: {reason(ended)}")
@@ -122,11 +122,14 @@ class Conversation:
         return message.node == self.number and message.kind not in ("Command", "Flow")
 
 
-def acknowledgement(answers: Acknowledges, last: bool = False) -> Callable[[Decoded], bool]:
+def acknowledgement(
+    answers: Acknowledges, last: bool = False, soon: Callable[[], bool] = lambda: False
+) -> Callable[[Decoded], bool]:
     """Whether a message acknowledges that command; with `last`, as its end.
 
     A module that does not know the command at all refuses it under a number of its own, at once. What is refused while
-    an accepted command is under way is the same command of another host.
+    an accepted command is under way is the same command of another host. But `soon` after it the acceptance may have
+    been that of another host, and the refusal is ours: it counts then.
     """
     known = {answers} if last else {answers, Acknowledges.UNKNOWN}
 
@@ -136,7 +139,13 @@ def acknowledgement(answers: Acknowledges, last: bool = False) -> Callable[[Deco
             message.kind == "Reply"
             and fields["Code"] == MessageToHost.ACKNOWLEDGEMENT
             and fields["Acknowledges"] in known
-            and not (last and fields["Result"] in (Result.ACCEPTED, *REFUSED))
+            and not (last and fields["Result"] == Result.ACCEPTED)
+            and not (last and fields["Result"] in REFUSED and not soon())
         )
 
     return wanted
+
+
+def _within(seconds: float) -> Callable[[], bool]:
+    until = time.monotonic() + seconds
+    return lambda: time.monotonic() < until

@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from math import inf
 from typing import Any, NamedTuple, NoReturn, Protocol
 
 import can
@@ -104,6 +105,7 @@ class Several:
         self.port, self._names = port, dict(names)
         self.listen: Callable[[float, Decoded], None] = lambda at, message: None  # everything they say, and when, s
         self._turning: set[int] = set()  # tools
+        self._turned = -inf  # when the last of them began, s
         self._alive = port.now() + _KEEP_ALIVE
         self._unanswered = dict.fromkeys(names, 0)  # questions since a module said anything
 
@@ -143,7 +145,8 @@ class Several:
                 elif result == Result.CARRIED_OUT:
                     found[number] = Arrived(counts, self.port.now() - asked)
                     left.discard(number)
-                elif not (number in accepted and result in REFUSED):  # else it refused another host
+                elif not (number in accepted and result in REFUSED and self.port.now() >= asked + PATIENCE):
+                    # within the patience the acceptance may be another host's, and the refusal ours
                     self._fail(number, f"was told to move to {targets[number]:g}: {reason(result)}")
         return found
 
@@ -162,6 +165,7 @@ class Several:
             fields = {"Code": Code.MOVE, "Move": Move.START, "Direction": direction, "Argument": thousandths}
             self._command(number, f"to turn at {speed:g} rev/min", Acknowledges.START, fields)
             self._turning.add(number)
+            self._turned = self.port.now()
 
     def rest(self, seconds: float) -> None:
         """Let time pass; tools go on turning."""
@@ -219,13 +223,16 @@ class Several:
             if message is not None:
                 self._unanswered[message.fields["BoardID"] if message.kind == "Reply" else message.node] = 0
                 self.listen(self.port.now(), message)
-                ended = self._turning and acknowledgement(Acknowledges.START, last=True)(message)
+                ended = self._turning and self._ends_turning(message)
                 if ended and (number := message.fields["BoardID"]) in self._turning:
                     self._turning.discard(number)
                     self._fail(number, f"does not turn any more: {reason(message.fields['Result'])}")
                 return message
             if self.port.now() >= until:
                 return None
+
+    def _ends_turning(self, message: Decoded) -> bool:
+        return acknowledgement(Acknowledges.START, True, lambda: self.port.now() < self._turned + PATIENCE)(message)
 
     def _ask_all(self) -> None:
         """MachineError naming a module that has answered none of the last questions."""
