@@ -50,7 +50,7 @@ def learn(
             for number in range(len(learned.results))
         ]
         titles = ["trial", *(f"{axis} RMS error [{last.units[f'{axis}_measured']}]" for axis in rms)]
-        show_table(f"Learning, {last.meta['mode']}", titles, rows)
+        show_table(f"Learning, {last.meta['mode']}: errors of whole trials, the first period too", titles, rows)
         for note in learned.notes:
             typer.echo(note)
         for kind in ("trials", "csv"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,15 @@ def test_trials_leave_a_tenth_of_the_error() -> None:
     assert len(learned.results) == 8 and learned.correction["X"].shape == (2500,)
     np.testing.assert_array_equal(learned.results[0]["X_reference"], learned.results[-1]["X_reference"])
     assert learned.results[-1].meta["controller"]["X"]["name"] == "p, learning"
+
+
+def test_a_trial_whose_timing_was_off_is_told() -> None:
+    """Its late samples were blamed on the gains."""
+    learned = learn(experiment(), 2)
+    first, last = learned.results
+    late = rds.Result(last.columns, last.units, last.meta | {"verdict": "void"})
+    learned = replace(learned, results=(first, late))
+    assert any(note.startswith("the timing of trial 2 was void") for note in learned.notes)
 
 
 def test_the_first_trial_is_the_experiment() -> None:

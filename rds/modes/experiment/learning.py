@@ -25,7 +25,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.quantities import Quantity
-from rds.core.types import Controller, Ending, Reference, Source
+from rds.core.types import Controller, Ending, Reference, Source, Verdict
 from rds.machines.converter import limits
 from rds.modes.experiment.experiment import Experiment
 from rds.modes.loop.plan import AxisPlan, Plan
@@ -63,19 +63,26 @@ class Learned:
 
     @property
     def rms(self) -> dict[str, list[float]]:
-        """RMS of each axis's tracking error by trial, in its unit."""
+        """RMS of each axis's tracking error by trial, in its unit, over the whole of it: the first period, too."""
         axes = self.results[0].meta["axes"]
         return {axis: [_rms(result, axis) for result in self.results] for axis in axes}
 
     @property
     def converged(self) -> bool:
-        """Whether no axis's last trial is worse than its first one, nor half as bad again as its best one."""
+        """Whether no axis's last trial is over 1 % worse than its first one, nor half as bad again as its best one."""
         return not any(map(_grows, self.rms.values()))
 
     @property
     def notes(self) -> list[str]:
-        """What to know of the trials: where errors grew, and where voltages were at their limits; a sentence each."""
-        said = []
+        """What to know of the trials, a sentence each: where the timing was off, errors grew, or voltages were at their
+        limits.
+        """
+        said = [
+            f"the timing of trial {number} was {result.verdict}: {result.meta.get('verdict_reason')}. Its error may be "
+            "that of the late samples, and the next trials have learnt from it"
+            for number, result in enumerate(self.results, 1)
+            if result.verdict not in (None, Verdict.MET)
+        ]
         for axis, errors in self.rms.items():
             unit = self.results[0].units[f"{axis}_measured"]
             best = errors.index(min(errors))

@@ -48,8 +48,9 @@ _DIGITS |= {"compute, median [µs]": 1, "compute, 99 % [µs]": 1, "time [s]": 3}
 _NOTE = (
     "Contour error: of the measured position from the programmed path; path error: of the commanded one. Feed ripple: "
     "the largest deviation of the commanded speed from the programmed feed, at least a sample and the filter's length "
-    "from where a segment begins or ends. Jerk: third differences of the commanded positions, of the worst axis. "
-    "Compute: time of the interpolator for one row, here and now."
+    "from where a segment begins or ends. Jerk: third differences of the commanded positions, of the worst axis; the "
+    "jump to the feed from rest, and back, which a method without a filter makes, is not in it. Compute: "
+    "time of the interpolator for one row, here and now."
 )
 
 
