@@ -26,12 +26,15 @@ def learn(
     """Iterative learning control: the RMS error of each trial. The exit code is 1 if the errors grow."""
     with refusals(), stdout_kept(json):
         from rds.modes.experiment import Experiment
+        from rds.modes.experiment.folder import require_writable
         from rds.modes.experiment.learning import learn as learn_trials
 
         def tell(number: int, result: object) -> None:
             typer.echo(f"rds: trial {number} of {trials} is over", err=True)
 
         made = Experiment.from_toml(experiment)
+        if out is not None:
+            require_writable(out)
         learned = learn_trials(made, trials, mode=mode, gain=gain, lead=lead, cutoff=cutoff, trial=tell)
         rms, last = learned.rms, learned.results[-1]
         files: dict[str, Path] = {}

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import rds
+from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.modes.experiment.learning import learn, low_pass
+from tests.documents import ROOT
 
 SINE = {"kind": "sinusoid", "amplitude": 5.0, "frequency": 0.4}
 
@@ -152,3 +156,11 @@ def test_it_learns_on_the_machine() -> None:
     words = {"model": None, "sample_period": 0.002, "duration": 1.25, "reference": quick}
     learned = learn(experiment(**words), 3, mode="implementation")
     assert learned.rms["X"][-1] < 0.7 * learned.rms["X"][0]
+
+
+def test_a_place_for_the_results_is_looked_at_before_the_first_trial(tmp_path: Path) -> None:
+    """A file of that name was found after the last one, and the trials were lost."""
+    there = tmp_path / "there"
+    there.write_text("mine")
+    refused = CliRunner().invoke(app, ["learn", str(ROOT / "examples" / "experiment.toml"), "--out", str(there)])
+    assert refused.exit_code == 2 and "is a file, not a folder" in refused.stderr and "trial 1" not in refused.stderr
