@@ -43,7 +43,10 @@ def test_a_trial_whose_timing_was_off_is_told() -> None:
     first, last = learned.results
     late = rds.Result(last.columns, last.units, last.meta | {"verdict": "void"})
     learned = replace(learned, results=(first, late))
-    assert any(note.startswith("the timing of trial 2 was void") for note in learned.notes)
+    (note,) = (note for note in learned.notes if note.startswith("the timing of trial 2 was void"))
+    assert "learnt from it" not in note  # nothing follows the last trial
+    (note,) = (note for note in replace(learned, results=(late, first)).notes if "trial 1 was void" in note)
+    assert "learnt from it" in note
 
 
 def test_the_first_trial_is_the_experiment() -> None:

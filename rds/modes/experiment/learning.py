@@ -79,7 +79,7 @@ class Learned:
         """
         said = [
             f"the timing of trial {number} was {result.verdict}: {result.meta.get('verdict_reason')}. Its error may be "
-            "that of the late samples, and the next trials have learnt from it"
+            f"that of the late samples{', and the next trials have learnt from it' * (number < len(self.results))}"
             for number, result in enumerate(self.results, 1)
             if result.verdict not in (None, Verdict.MET)
         ]
