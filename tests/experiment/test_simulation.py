@@ -228,3 +228,18 @@ def test_another_model_takes_the_place_of_the_axis_s_own() -> None:
     assert [each.plan().axes[0].model.params["K"] for each in (experiment, other)] == [1.0, 3.0]
     with pytest.raises(rds.InputError, match="it has several axes"):
         rds.Experiment(**GOOD, axis=("X", "Y")).with_model("linear-axis")
+
+
+@pytest.mark.parametrize(("coupled", "owner"), [(False, "X"), (True, "X, Y")])
+def test_a_state_that_became_nan_behind_a_finite_voltage_is_told(coupled: bool, owner: str) -> None:
+    def lost(t: float, r: Any, y: Any, state: Any, params: Any) -> Any:
+        return (np.zeros(2) if coupled else 0.0), [state[0] + (np.nan if t > 0.1 else 1.0)]
+
+    def notes(first: float) -> list[str]:
+        controller = rds.Controller(lost, [first], coupled=coupled)
+        axis = {"axis": ("X", "Y")} if coupled else {}
+        return rds.Experiment(**(GOOD | {"controller": controller} | axis)).run().meta["notes"]
+
+    (note,) = notes(0.0)
+    assert note.startswith(f"the state of the controller of {owner} holds NaN at the end of the run")
+    assert notes(np.nan) == []  # it is meant so
