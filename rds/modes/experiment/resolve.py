@@ -82,6 +82,8 @@ def resolve(
         made, periods[axis.name], note = _axis_plan(own, setting, driven, samples)
         axes.append(made)
         notes += [note] if note else []
+    if isinstance(leads, Program):
+        notes += machine.too_fast(each.axis.name for each in axes if each.command is Command.VOLTAGE)
     network = read_network(words, folder)
     words.done()
     _check_coupling(axes, words)
