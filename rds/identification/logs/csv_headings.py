@@ -19,24 +19,9 @@ from rds.results.units import split_heading
 Split = Callable[[str], list[str]]
 _BRACES = re.compile(r"(?P<name>.*?)\s*\{(?P<unit>[^{}]*)\}\s*")
 # what stands in brackets behind a name as a unit does, and says which of two signals of one name it is
-_NO_UNITS = frozenset(
-    [
-        "setpoint",
-        "set",
-        "demand",
-        "desired",
-        "target",
-        "commanded",
-        "command",
-        "reference",
-        "ref",
-        "soll",
-        "measured",
-        "actual",
-        "act",
-        "feedback",
-        "ist",
-    ]
+_NO_UNITS = (
+    *("setpoint", "set", "demand", "desired", "target", "commanded", "command", "reference", "ref", "soll"),
+    *("measured", "actual", "act", "feedback", "ist"),
 )
 _BETWEEN = re.compile(r"\s*[/,]\s*|\s+[iI][nN]\s+")  # a name and its unit
 _LABVIEW, _LABVIEW_UNITS, _LABVIEW_TIME = "LabVIEW Measurement", "Y_Unit_Label", "X_Dimension"
