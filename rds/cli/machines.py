@@ -301,7 +301,7 @@ def check_machine(file: Path, json: bool, axes: int | None) -> None:
         machine = load_machine(str(file))
         _check_motions(machine)
         judged = verdict(machine)
-    _show_verdict(judged, json, notes=machine.too_fast(machine.axes))
+    _show_verdict(judged, json, notes=[*machine.too_fast(machine.axes), *machine.unlinked()])
 
 
 def _check_motions(machine: Machine) -> None:

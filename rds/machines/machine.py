@@ -217,6 +217,16 @@ class Machine:
                 )
         return said
 
+    def unlinked(self) -> list[str]:
+        """A sentence for each position axis of a machine with links that moves none of them."""
+        moved = {link.axis for link in self.links}
+        return [
+            f"axis {axis.name} moves no link: where it is changes nothing of the tool's pose on the work; name it as "
+            f'axis = "{axis.name}" of a link'
+            for axis in self.axes.values()
+            if self.links and not axis.is_spindle and axis.name not in moved
+        ]
+
     @cached_property
     def slots(self) -> dict[str, int]:
         """The place of each axis's voltage in cyclic commands, from 0."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -137,7 +138,14 @@ def test_a_limit_of_velocity_that_the_model_does_not_reach_is_noted(tmp_path: Pa
     assert result.meta["notes"].count(note) == 1
     for name in machine_names():
         known = load_machine(name)
-        assert known.too_fast(known.axes) == []
+        assert known.too_fast(known.axes) == known.unlinked() == []
+
+
+def test_an_axis_that_moves_no_link_is_noted() -> None:
+    mill = load_machine("mrm-mill")
+    bare = replace(mill, links=tuple(replace(link, axis="" if link.axis == "Y" else link.axis) for link in mill.links))
+    (note,) = bare.unlinked()
+    assert note.startswith("axis Y moves no link")
 
 
 def test_workspaces() -> None:
