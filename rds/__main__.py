@@ -10,8 +10,19 @@ _ELSEWHERE = {"--help", "--container", "--scheduler"}  # with which `rds grade r
 _INTERRUPTED = 130  # the exit code of what Ctrl-C ended, by the shell's custom
 
 
+def open_streams() -> None:
+    """What is closed of stdin, stdout and stderr reads and writes nothing from here on.
+
+    Else the next file or socket would get its number, which a child that is started takes for its stdin.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None and os.open(os.devnull, os.O_RDWR) == number:
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
+
+
 def main() -> None:
     """Run the command line; Ctrl-C in the middle of an import is no traceback."""
+    open_streams()
     try:
         if sys.argv[1:3] == ["nc", "canon"]:
             from rds.cli.canon import canon_alone

@@ -17,6 +17,7 @@ import pytest
 from typer.testing import CliRunner
 
 import rds
+from rds.__main__ import open_streams
 from rds.cli.main import HEADINGS, app, progress_bars
 
 SIMULATION = """
@@ -447,3 +448,17 @@ def test_a_model_that_overflows_is_told_without_lines_of_the_package(tmp_path: P
     done = command("run", str(tmp_path / "loop.toml"), "--out", str(tmp_path / "out"))
     assert done.returncode == 2 and "the model's position became" in done.stderr
     assert "integrate.py" not in done.stderr
+
+
+def test_a_closed_stdin_leaves_its_number_to_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lock of a channel got the number 0, which its hub took for a stdin: the hub was started again and again."""
+    kept = os.dup(0)
+    try:
+        os.close(0)
+        monkeypatch.setattr(sys, "stdin", None)
+        open_streams()
+        assert os.fstat(0).st_rdev == os.stat(os.devnull).st_rdev
+        assert sys.stdin.read() == ""
+    finally:
+        os.dup2(kept, 0)
+        os.close(kept)

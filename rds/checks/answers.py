@@ -58,6 +58,8 @@ def _no_pair(answer: Any) -> tuple[str, str]:
 
 
 def _number_fault(u: Any) -> tuple[str, str, str] | None:
+    if isinstance(u, np.ndarray) and u.size == 1 and u.dtype.kind in "fiu":  # as runs take it
+        u = u.item()
     if is_real(u):
         try:
             if isfinite(u):
@@ -66,8 +68,6 @@ def _number_fault(u: Any) -> tuple[str, str, str] | None:
             return clauses.VOLTAGE, f"the voltage {shown(u)}", "return a number that is not above 1e308 V"
         return clauses.VOLTAGE, f"the voltage {u}", "look for a division by zero, a root or a logarithm"
     said = f"the voltage {shown(u)} ({type(u).__name__})"
-    if isinstance(u, np.ndarray) and u.size == 1:
-        return clauses.VOLTAGE, said, "return one number in V, as in `float(u.item())`"
     if isinstance(u, np.ndarray | list | tuple | dict):
         return clauses.VOLTAGE, said, "return one number in V first and the state second: `return voltage, next_state`"
     return clauses.VOLTAGE, said, "return one real number in V"

@@ -19,14 +19,14 @@ from rds.checks.memory import judge_memory
 from rds.checks.replay import Call
 from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.timing import Work, judge_time
-from rds.checks.values import has_nan, same, size
+from rds.checks.values import same, size
 from rds.core.adapt import as_controller, is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.load import wants_state
 from rds.core.signals import declaration_fault
 from rds.core.signature import argument_fault
 from rds.core.types import Controller, Reference
-from rds.core.values import shown
+from rds.core.values import has_nan, shown
 
 BUDGET = 2.0  # s of its own for each pass over the run: a slow controller is judged by fewer samples
 _LEAST = 5  # samples, whatever they take
@@ -119,7 +119,7 @@ class _Run:
                     return None
                 voltage, state, *_ = answer
                 self.sizes.append(size(state))
-                for plant, u in zip(plants, np.atleast_1d(np.asarray(voltage, dtype=float)), strict=True):
+                for plant, u in zip(plants, np.asarray(voltage, dtype=float).ravel(), strict=True):
                     plant.move(t, float(u))
         return None
 

@@ -84,19 +84,6 @@ def is_plain(value: Any, depth: int = 0) -> bool:
     return type(value) is dict and all(is_plain(part, depth + 1) for pair in value.items() for part in pair)
 
 
-def has_nan(value: Any, depth: int = 0) -> bool:
-    """Whether any number in it is NaN, as far as it consists of lists, tuples, dicts and arrays."""
-    if isinstance(value, np.ndarray):
-        return value.dtype.kind in "fc" and bool(np.isnan(value).any())
-    if isinstance(value, float | np.floating):
-        return bool(value != value)
-    if depth > _DEEPEST:
-        return False
-    if isinstance(value, Mapping):
-        return any(has_nan(part, depth + 1) for part in value.values())
-    return isinstance(value, list | tuple | deque) and any(has_nan(part, depth + 1) for part in value)
-
-
 def size(value: Any, depth: int = 0) -> int:
     """How many single values it holds."""
     if isinstance(value, np.ndarray):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -300,7 +301,7 @@ def check_machine(file: Path, json: bool, axes: int | None) -> None:
         machine = load_machine(str(file))
         _check_motions(machine)
         judged = verdict(machine)
-    _show_verdict(judged, json)
+    _show_verdict(judged, json, notes=[*machine.too_fast(machine.axes), *machine.unlinked()])
 
 
 def _check_motions(machine: Machine) -> None:
@@ -322,9 +323,9 @@ def _check_motions(machine: Machine) -> None:
             kind.from_table(axis.machine, f"{where}.machine]")
 
 
-def _show_verdict(judged: Verdict, json: bool, first: str = "") -> None:
+def _show_verdict(judged: Verdict, json: bool, first: str = "", notes: Sequence[str] = ()) -> None:
     if json:
-        print_json(judged.to_json())
+        print_json({**judged.to_json(), "notes": [*notes]})
     else:
         if first:
             typer.echo(first)
@@ -332,6 +333,8 @@ def _show_verdict(judged: Verdict, json: bool, first: str = "") -> None:
         marks = {True: "ok", False: "no", None: "–"}
         for check in judged.checks:
             typer.echo(f"  {marks[check.passed]:3} {check.name:12} {check.text}")
+        for note in notes:
+            typer.echo(f"note: {note}")
     raise typer.Exit(0 if judged.ok else 1)
 
 

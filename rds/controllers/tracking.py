@@ -9,9 +9,11 @@ A spindle, whose speed is measured, has the same law with one state and no obser
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
+
+import numpy as np
 
 from rds.controllers import observer, speed_tracking
 from rds.controllers.axis_data import AxisData, axis_data
@@ -122,6 +124,18 @@ def is_sampled_stable(tau: Any, K: Any, T: float, g1: Any, g2: Any) -> Any:
     trace = 1.0 - b1 * kx + a22 - b2 * kv
     determinant = (1.0 - b1 * kx) * (a22 - b2 * kv) + b2 * kx * (a12 - b1 * kv)
     return (abs(determinant) < 1.0) & (abs(trace) < 1.0 + determinant)
+
+
+def is_stable_on_a_bus(coefficients: Sequence[float], T: float) -> bool:
+    """Whether the loop sampled every `T` s is stable where a voltage acts one sample later, as on any bus.
+
+    `coefficients` are those of `law`, whose observer is told the voltage at once.
+    """
+    inverse_gain, inertia, g1, g2, L, F, G, H, *_ = coefficients
+    a12, a22, b1, b2 = observer.held_axis(inertia / inverse_gain, 1.0 / inverse_gain, T)
+    voltage = -inertia * np.array([g1 + g2 * L, 0.0, g2, 0.0])  # of position, velocity, z, and the voltage before
+    step = np.array([[1.0, a12, 0.0, b1], [0.0, a22, 0.0, b2], [G, 0.0, F, 0.0] + H * voltage, voltage])
+    return bool(abs(np.linalg.eigvals(step)).max() < 1.0)
 
 
 def _check_sampled(axis: AxisData, g1: float, g2: float, owner: str) -> None:

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import copy
+from collections import deque
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from rds.core.blame import student_error
 from rds.core.errors import ContractError
@@ -28,3 +32,16 @@ def own_copy(value: Any, what: str, where: str | None = None) -> Any:
     except Exception as error:
         said = f"{what} cannot be copied ({student_error(error)}); keep numbers, lists, dicts and arrays in it"
         raise ContractError(said, where) from error
+
+
+def has_nan(value: Any, depth: int = 0) -> bool:
+    """Whether any number in it is NaN, as far as it consists of lists, tuples, dicts and arrays."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind in "fc" and bool(np.isnan(value).any())
+    if isinstance(value, float | np.floating):
+        return bool(value != value)
+    if depth > 40:
+        return False
+    if isinstance(value, Mapping):
+        return any(has_nan(part, depth + 1) for part in value.values())
+    return isinstance(value, list | tuple | deque) and any(has_nan(part, depth + 1) for part in value)

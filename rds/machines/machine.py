@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.resources import files
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -201,6 +203,29 @@ class Machine:
     def spindle_power(self) -> float | None:
         """What the motor of its spindle has, W; None where nobody says so."""
         return next((axis.power for axis in self.axes.values() if axis.power is not None), None)
+
+    def too_fast(self, axes: Iterable[str]) -> list[str]:
+        """A sentence for each of these axes whose limit of velocity is more than its model reaches at full voltage."""
+        said = []
+        for axis in map(self.axis, axes):
+            most = abs(float(axis.model.get("K", inf))) * self.converter.range
+            if axis.limits is not None and axis.limits.velocity > most * (1.0 + 1e-9):
+                said.append(
+                    f"the limit of velocity of axis {axis.name}, {axis.limits.velocity:g} {axis.unit}/s, is more than "
+                    f"its model reaches at {self.converter.range:g} V, {most:.4g} {axis.unit}/s: motion planned to it "
+                    f"leaves the axis behind; lower velocity in [axis.{axis.name}.limits], or correct the model's K"
+                )
+        return said
+
+    def unlinked(self) -> list[str]:
+        """A sentence for each position axis of a machine with links that moves none of them."""
+        moved = {link.axis for link in self.links}
+        return [
+            f"axis {axis.name} moves no link: where it is changes nothing of the tool's pose on the work; name it as "
+            f'axis = "{axis.name}" of a link'
+            for axis in self.axes.values()
+            if self.links and not axis.is_spindle and axis.name not in moved
+        ]
 
     @cached_property
     def slots(self) -> dict[str, int]:

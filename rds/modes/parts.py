@@ -153,6 +153,7 @@ def loop(
         _going_on,
         drive.changes,
         drive.sets_references,
+        drive.notes,
     )
 
 

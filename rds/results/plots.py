@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from rds.results.result import Result
 
+_ROUNDING, _LEAST_ERROR = 1e-9, 1e-3  # unit of the axis: no error at all, and what is drawn of it
 _PANEL_HEIGHT = 2.45  # inches
 _COLUMN_WIDTH = 4.3  # inches, at least, of each axis where there are several
 
@@ -120,6 +121,8 @@ def _draw_error(axes: Axes, result: Result, axis: str) -> None:
     unit = result.units.get(f"{axis}_measured", "")
     axes.plot(time, difference, color=QUANTITIES["error"], linewidth=1.1)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
+    if np.abs(difference).max(initial=0.0) < _ROUNDING:
+        axes.set_ylim(-_LEAST_ERROR, _LEAST_ERROR)
     for value, name, style in _means(difference[used]):
         axes.plot(time[used][[0, -1]], [value, value], color=VERMILLION, linewidth=1.3, linestyle=style)
         axes.plot([], [], color=VERMILLION, linewidth=1.3, linestyle=style, label=f"{name} {value:.3g}")

@@ -172,6 +172,8 @@ def test_an_unknown_interface_or_axis_is_bad_input() -> None:
         AxisDrivers(MACHINE, interface="nonsense", channel="1")
     with pytest.raises(InputError, match="no axis 'W'"):
         AxisDrivers(MACHINE, ["W"], channel="m")
+    with pytest.raises(MachineError, match="a serial line of units has none, is served with --dialect dcs"):
+        AxisDrivers(MACHINE, interface="serial", channel="no-such-line")
 
 
 def test_a_machine_killed_while_running_is_lost_after_ten_periods(machine_process: Callable[..., Any]) -> None:

@@ -149,10 +149,6 @@ def array_of_several(t, r, y, state, params):
     return np.array([1.0, 2.0]), state
 
 
-def array_of_one(t, r, y, state, params):
-    return np.array([r.position - y]), state
-
-
 def not_a_number(t, r, y, state, params):
     return float("nan") if t > 0.5 else 0.0, state
 
@@ -255,7 +251,6 @@ BAD = [
     (complex_number, clauses.VOLTAGE, "(complex)"),
     (no_number, clauses.VOLTAGE, "None"),
     (array_of_several, clauses.VOLTAGE, "one number"),
-    (array_of_one, clauses.VOLTAGE, "u.item()"),
     (not_a_number, clauses.VOLTAGE, "nan at t = 0.501 s"),
     (infinite, clauses.VOLTAGE, "inf"),
     (divides_by_zero, clauses.RUNS, "ZeroDivisionError"),

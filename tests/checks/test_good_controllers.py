@@ -42,6 +42,10 @@ def array_without_dimensions(t, r, y, state, params):
     return np.array(GAIN * (r.position - y)), state
 
 
+def array_of_one(t, r, y, state, params):
+    return np.array([[GAIN * (r.position - y)]]), state
+
+
 def list_answer(t, r, y, state, params):
     return [GAIN * (r.position - y), state]
 
@@ -191,6 +195,7 @@ GOOD = [
     (integer_voltage, None),
     (numpy_voltage, None),
     (array_without_dimensions, None),
+    (array_of_one, None),
     (list_answer, None),
     (tuple_state, (0.0, 0.0)),
     (list_state_returned_as_tuple, [0.0]),

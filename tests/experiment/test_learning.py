@@ -120,6 +120,15 @@ def test_where_the_voltage_is_at_its_limit_nothing_winds_up(own: dict[str, float
     assert learned.converged and "the command was at its limit in 9" in learned.notes[0]
 
 
+def test_a_law_that_is_at_its_limits_at_rest_is_not_told_to_move_slower() -> None:
+    def bang_bang(t: float, r: Any, y: float, state: Any, params: Any) -> Any:
+        return (10.0 if r.position > y else -10.0), state
+
+    learned = learn(experiment(reference={"kind": "constant", "value": 0.0}, controller=bang_bang), 2)
+    (note,) = (note for note in learned.notes if "at its limit" in note)
+    assert note.endswith("lower the gains of the law")
+
+
 def test_the_lead_is_two_samples_whatever_the_sample_period() -> None:
     slow = experiment(sample_period=5e-3)
     np.testing.assert_array_equal(learn(slow, 2).correction["X"], learn(slow, 2, lead=0.01).correction["X"])

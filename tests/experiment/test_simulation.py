@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import rds
+from rds.controllers.tracking import is_stable_on_a_bus
+from rds.core.types import Reference
 from rds.modes.experiment.outcome import outcome
 from rds.modes.loop.stopwatch import TIMING_COLUMNS
 from rds.modes.process.host import run_plan
@@ -228,3 +230,43 @@ def test_another_model_takes_the_place_of_the_axis_s_own() -> None:
     assert [each.plan().axes[0].model.params["K"] for each in (experiment, other)] == [1.0, 3.0]
     with pytest.raises(rds.InputError, match="it has several axes"):
         rds.Experiment(**GOOD, axis=("X", "Y")).with_model("linear-axis")
+
+
+@pytest.mark.parametrize(("coupled", "owner"), [(False, "X"), (True, "X, Y")])
+def test_a_state_that_became_nan_behind_a_finite_voltage_is_told(coupled: bool, owner: str) -> None:
+    def lost(t: float, r: Any, y: Any, state: Any, params: Any) -> Any:
+        return (np.zeros(2) if coupled else 0.0), [state[0] + (np.nan if t > 0.1 else 1.0)]
+
+    def notes(first: float) -> list[str]:
+        controller = rds.Controller(lost, [first], coupled=coupled)
+        axis = {"axis": ("X", "Y")} if coupled else {}
+        return rds.Experiment(**(GOOD | {"controller": controller} | axis)).run().meta["notes"]
+
+    (note,) = notes(0.0)
+    assert note.startswith(f"the state of the controller of {owner} holds NaN at the end of the run")
+    assert notes(np.nan) == []  # it is meant so
+
+
+@pytest.mark.parametrize("law", ["tracking", "feedforward", "zero-phase"])
+def test_a_loop_that_a_bus_makes_unstable_is_refused_before_the_run(law: str, alone: Path) -> None:
+    slow = GOOD | {"controller": law, "sample_period": 0.05}
+    assert abs(rds.Experiment(**slow).run()["X_measured"]).max() < 4.0  # one sample less of delay
+    with pytest.raises(rds.InputError, match=r"acts one sample of 0\.05 s later than in a simulation"):
+        rds.Experiment(**slow, mode="implementation").run()
+
+
+def test_the_delay_of_a_bus_as_the_loop_of_the_law_has_it() -> None:
+    """The network between model and law delays by one sample, as a bus does: stable at 0.03 s, not at 0.04 s."""
+    for T in (0.03, 0.04):
+        law = rds.library_controller("tracking", {"tau": 0.009943, "K": 1.764}, T, 1e9)
+        x = v = 0.0
+        held, state, largest = 0.0, law.initial_state, []
+        a22 = np.exp(-T / 0.009943)
+        for k in range(400):
+            u, state = law.control(k * T, Reference(1.0, 0.0, 0.0), x, state, law.params)
+            a12 = 0.009943 * (1.0 - a22)
+            x, v = x + a12 * v + 1.764 * (T - a12) * held, a22 * v + 1.764 * (1.0 - a22) * held
+            held = u
+            largest.append(abs(x - 1.0))
+        is_stable = bool(max(largest[-20:]) < 0.01)
+        assert is_stable_on_a_bus(law.params["coefficients"], T) is is_stable is (T < 0.035)

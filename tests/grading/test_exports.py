@@ -291,6 +291,9 @@ def test_moodle_without_a_download_has_three_columns(tmp_path: Path) -> None:
         "4711,,26",
         ",ada@x.edu,26",
     ]
+    assert done.notes == export(tmp_path / "out", "moodle", None, NOTHING).notes  # the same again
+    *before, last = export(tmp_path / "out", "moodle", None, ExportOptions(points=10.0)).notes
+    assert tuple(before) == done.notes and "moodle.csv: an earlier export with other content was there" in last
 
 
 def page_with(*sizes: int) -> str:

@@ -63,6 +63,8 @@ def written(folder: Path, name: str, head: str, columns: Sequence[np.ndarray], m
         ("pos [mm]", "pos", "mm"),
         ("pos {furlong}", "pos", "furlong"),
         ("pos/mm", "pos", "mm"),
+        ("x (setpoint)", "x (setpoint)", None),
+        ("x (setpoint) [mm]", "x (setpoint)", "mm"),
         ("speed / mm/s", "speed", "mm/s"),
         ("pos in mm", "pos", "mm"),
         ("pos, µm", "pos", "µm"),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from machines.machine_text import link, machine
 
+import rds
 from rds.core.toml_text import toml_text
 from rds.machines import load_machine, machine_names
 from rds.machines.configuration import Verdict, verdict
@@ -122,6 +124,28 @@ def test_a_machine_without_links_is_not_judged() -> None:
     found = verdict(load_machine("mini-cnc"))
     assert [(check.name, check.passed) for check in found.checks] == [("chain", None), ("identity", True)]
     assert found.to_json()["ok"] is True
+
+
+def test_a_limit_of_velocity_that_the_model_does_not_reach_is_noted(tmp_path: Path) -> None:
+    """X of the mini CNC does 1.764 (mm/s)/V at 10 V."""
+    text = Path(load_machine("mini-cnc").path).read_text()
+    (tmp_path / "fast.toml").write_text(text.replace("velocity = 13.0", "velocity = 17.65", 1))
+    (tmp_path / "part.ngc").write_text("G21 G90 F60\nG1 X1\nM2\n")
+    found = load_machine(tmp_path / "fast.toml")
+    (note,) = found.too_fast(found.axes)
+    assert "of axis X, 17.65 mm/s, is more than its model reaches at 10 V, 17.64 mm/s" in note
+    result = rds.PartProgram(tmp_path / "part.ngc", machine=str(tmp_path / "fast.toml")).run()
+    assert result.meta["notes"].count(note) == 1
+    for name in machine_names():
+        known = load_machine(name)
+        assert known.too_fast(known.axes) == known.unlinked() == []
+
+
+def test_an_axis_that_moves_no_link_is_noted() -> None:
+    mill = load_machine("mrm-mill")
+    bare = replace(mill, links=tuple(replace(link, axis="" if link.axis == "Y" else link.axis) for link in mill.links))
+    (note,) = bare.unlinked()
+    assert note.startswith("axis Y moves no link")
 
 
 def test_workspaces() -> None:

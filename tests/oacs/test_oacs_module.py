@@ -276,6 +276,19 @@ def test_a_wire_that_breaks_is_not_taken_for_the_zero(bench: Benches, before: bo
     assert plant.counts / 169.0 == pytest.approx(plant.true_position, abs=0.02)
 
 
+@pytest.mark.parametrize("seconds", [0.15, 0.5, 2.0])
+def test_a_wire_that_opens_and_closes_again_is_not_taken_for_the_zero(bench: Benches, seconds: float) -> None:
+    rig = bench("X", start=-100.0)
+    rig.move(Move.HOME)
+    rig.run(1.0)
+    rig.module.set_wire(-1, False, rig.now)
+    rig.run(seconds)
+    rig.module.set_wire(-1, None, rig.now)
+    assert rig.until_done() == Result.STOPPED_BY_LIMIT
+    plant = rig.module.plant
+    assert not rig.module.mover.homed and plant.counts / 169.0 == pytest.approx(plant.true_position, abs=0.02)
+
+
 def test_a_homing_that_is_stopped_while_it_leaves_the_switch_leaves_the_zero_alone(bench: Benches) -> None:
     rig = bench("X", start=-100.0)
     rig.move(Move.HOME)

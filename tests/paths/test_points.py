@@ -95,6 +95,7 @@ def test_repeated_points_are_left_out_and_counted(file: Path) -> None:
         ("x [mm], y [mm]\n1,2\n3,\n", None, ":3", "y = '' is not a number"),
         ("x [mm], y [mm]\n1,2\n3,four\n", None, ":3", "y = 'four' is not a number"),
         ("x [mm]; y [mm]\n1,5;2,5\n", None, ":2", "x = '1,5' is not a number; write decimals with a point"),
+        ("1,5 2,5\n3,5 4,5\n", "mm", ":1", "'1,5 2,5' has decimal commas; write decimals with a point"),
         ("x [mm], y [mm]\n1,2\nnan,4\n", None, ":3", "x = 'nan' is not a number"),
         ("x [mm], y [mm]\n1,2\n1_0,4\n", None, ":3", "x = '1_0' is not a number"),
         ("x [mm], y [mm]\n1,2\n1e999,4\n", None, ":3", "beyond 1e+06 mm; is the unit 'mm' right?"),

@@ -82,6 +82,15 @@ def circle(**words: Any) -> rds.Experiment:
     return rds.Experiment(axis=["X", "Y"], controller="tracking", sample_period=T, reference=reference)
 
 
+@pytest.mark.parametrize(("last", "notes"), [("samples + 1", 0), ("samples", 1)])
+def test_a_last_row_that_is_not_the_end_of_the_path_is_told(here: Path, last: str, notes: int) -> None:
+    """Whoever writes range(1, samples) leaves 5 mm/s in 5 ms, 0.025 mm, of each segment out."""
+    (here / "mine.py").write_text(MINE.replace("range(1, samples + 1)", f"range(1, {last})"))
+    found = circle().run().meta["notes"]
+    assert [note for note in found if "mine.py is 0.0249 mm from the end of the path" in note] == found
+    assert len(found) == notes
+
+
 def apart(here: Path) -> dict[str, str]:
     """The same as two modules, a linear and a circular interpolator, neither of which can do the other's work."""
     choice = '(arc if hasattr(segment, "centre") else line)(segment, T)'

@@ -84,6 +84,15 @@ def test_the_error_shows_means_and_late_samples(result: Result) -> None:
     assert "late: 3" in said
 
 
+def test_rounding_is_not_drawn_as_an_error() -> None:
+    """An error of 1e-17 filled the picture of a spindle that stood still."""
+    still = make_result("simulation", "X")
+    still.columns["X_measured"] = still.columns["X_reference"] + 1e-17
+    still.columns["X_measured"][3] += 1e-12
+    (axes,) = plots.error(still, "X").axes
+    assert axes.get_ylim() == (-1e-3, 1e-3)
+
+
 def test_the_voltage_shows_the_limits(result: Result) -> None:
     assert "limit ±10 V" in labels(plots.voltage(result))
     without = Result(result.columns, result.units, {k: v for k, v in result.meta.items() if k != "voltage_range"})

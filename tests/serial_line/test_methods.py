@@ -329,6 +329,15 @@ def test_what_friction_leaves_of_a_servo_motor_is_no_lost_step(tmp_path: Path) -
     assert not any("lost" in said for said in methods_report([run], file, {"machine": machine.name}).findings)
 
 
+def test_an_arc_whose_end_is_off_its_circle_is_noted(tmp_path: Path) -> None:
+    """0.1 % of the radius is allowed: 40 µm at 40 mm, which the difference equations leave to the next segment."""
+    file = tmp_path / "part.ngc"
+    file.write_text("G21 G90 F600\nG3 X-40 Y40.038 I-40 J0\nG1 Y40\nM2\n")
+    made = serial_motion(file, load_machine("starmill"))
+    (note,) = (each for each in made.notes if "off the circle" in each)
+    assert note.startswith("the arc of line 2 ends 38 µm off")
+
+
 def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "part.ngc"
     file.write_text(CIRCLE)

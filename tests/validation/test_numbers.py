@@ -20,11 +20,13 @@ from rds.identification.logs.fingerprint import fingerprint, shared
 from rds.identification.logs.log import Log
 from rds.identification.logs.motion import noise as noise_of
 from rds.identification.structures.structures import structure
-from rds.identification.validate.assessment import assess, smoothed_velocity
+from rds.identification.validate.assessment import Range, assess, smoothed_velocity
 from rds.identification.validate.candidate import Candidate
+from rds.identification.validate.conclusion import _limits
 from rds.identification.validate.criterion import Rival, rank
 from rds.identification.validate.discrepancy import error_of
 from rds.identification.validate.validate import compare_models, validate
+from rds.identification.validate.verdict import Bands
 from tests.validation.validation_logs import STEP, T, X, candidate, moved, square
 from tests.validation.validation_logs import log as made_log
 
@@ -83,6 +85,17 @@ def test_the_range_of_speeds_is_that_of_the_motion_and_not_of_its_noise() -> Non
     y = 10.0 / (4.0 * pi) * np.sin(4.0 * pi * t) + 0.2 * np.random.default_rng(1).standard_normal(len(t))
     low, high = speed_range(Log("noisy", t, np.cos(4.0 * pi * t), y))
     assert -12.0 < low < -8.0 and 8.0 < high < 12.0
+
+
+def test_a_limit_is_told_of_what_was_beyond_the_fit() -> None:
+    """The voltages went beyond the fit's: the speeds, which did not, were named as the limit."""
+    u = square()
+    within = {"velocity": Range((-9.0, 9.0), (-9.0, 9.0), "mm/s"), "command": Range((-8.0, 8.0), (-5.0, 5.0), "V")}
+    a = replace(assess(candidate(), made_log(u)), ranges=within)
+    said = list(_limits(a, Bands()))
+    assert "up to the 8 V tried here" in said and not any("mm/s tried here" in each for each in said)
+    beyond = within | {"velocity": Range((-9.0, 9.0), (-5.0, 5.0), "mm/s")}
+    assert "up to the 9 mm/s tried here" in list(_limits(replace(a, ranges=beyond), Bands()))
 
 
 def test_the_velocity_changes_where_it_swings_whatever_the_encoder() -> None:

@@ -82,6 +82,11 @@ def open_bus(
                 "; `ls /dev/serial/by-id` shows serial adapters; one that may not be opened needs your user in its "
                 "group, dialout as a rule, and one that another program has open waits for that program's end"
             )
+        if interface == SERIAL:
+            remedy += (
+                "; this interface is python-can's, of CAN frames on a serial port: a serial line of units has none, is "
+                "served with --dialect dcs, and its units answer `rds scan --interface serial`"
+            )
         raise MachineError(f"bus {bus_name(interface, channel)} can't be opened: {error}; {remedy}") from error
     if interface in NOT_ADAPTERS:
         return bus

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -46,10 +46,20 @@ def export(out: Path, to: str, file: Path | None, wanted: ExportOptions) -> Writ
         raise InputError("-o has no meaning where a database is changed; leave it out", str(file))
     place = Path(str(wanted.gradebook)) if not made.files else file or out / module.FILE
     paths = _paths(place, made.files)
+    replaced = [path for path, data in paths.items() if path.is_file() and path.read_bytes() != data]
     write_files(paths)
     waiting = dict.fromkeys(finished.not_graded, "it has not been graded; run `rds grade run` again with --resume")
     left_out = {one_line(name): reason for name, reason in {**waiting, **made.unmatched}.items()}
-    return Written(str(place), tuple(str(path) for path in paths), made.students, left_out, made.notes)
+    notes = (*made.notes, *_of_replaced(replaced))
+    return Written(str(place), tuple(str(path) for path in paths), made.students, left_out, notes)
+
+
+def _of_replaced(paths: Sequence[Path]) -> list[str]:
+    """A note where files of an earlier export, perhaps for another gradebook, are no more."""
+    if not paths:
+        return []
+    what = str(paths[0]) if len(paths) == 1 else f"{len(paths)} files in {paths[0].parent}"
+    return [f"{what}: an earlier export with other content was there and is replaced; name another place by -o"]
 
 
 def _paths(place: Path, files: Mapping[str, bytes]) -> dict[Path, bytes]:

@@ -7,12 +7,15 @@ import symtable
 import sys
 from collections.abc import Collection, Iterator, Sequence
 from itertools import chain
+from typing import TYPE_CHECKING
 
 from rds.grading.intake import followed
 from rds.grading.sandbox.packages import ALLOWED
 
+if TYPE_CHECKING:
+    from rds.grading.intake.files import Files
+
 _THERE = frozenset({*sys.stdlib_module_names, *ALLOWED})  # modules that a submission can import
-_READERS = frozenset({"open", "loadtxt", "genfromtxt", "load", "loadmat", "fromfile"})
 _OF_LISTS = {"append", "clear", "extend", "fill", "insert", "pop", "put", "remove", "reverse", "sort"}
 _OF_TABLES = {"add", "discard", "popitem", "setdefault", "update"}
 CHANGING = frozenset(_OF_LISTS | _OF_TABLES)
@@ -39,7 +42,7 @@ def not_there(statement: ast.stmt) -> Iterator[str]:
         yield from (alias.asname or alias.name for alias in statement.names)
 
 
-def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str]) -> list[frozenset[str]]:
+def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str], files: Files) -> list[frozenset[str]]:
     """By statement the names that cannot be had there: modules, what is read from files, and what is made of these."""
     code = {name for statement in body for name in not_there(statement)}
     before = -1
@@ -51,34 +54,19 @@ def from_elsewhere(body: Sequence[ast.stmt], wanted: set[str]) -> list[frozenset
     for statement in body:
         here = now
         if isinstance(statement, followed.FUNCTIONS):
-            if used_within(statement) & now or reads_file(statement):
+            if used_within(statement) & now or files.read_by(statement):
                 now = now | {statement.name} - wanted
             elif statement.name in now - code:
                 now -= {statement.name}
         for node in chain.from_iterable(map(ast.walk, at_once(statement))):
             targets, value = bound(node)
             names = set(chain.from_iterable(map(stored, targets))) - wanted
-            if value is not None and (followed.names_in(value) & now or reads_file(statement)):
+            if value is not None and (followed.names_in(value) & now or files.read_by(statement)):
                 now, here = now | names, here | names
             elif isinstance(statement, ast.Assign) and (names - code) & now:
                 now -= names - code
         found.append(here)
     return found
-
-
-def reads_file(statement: ast.stmt) -> bool:
-    """Whether a statement cannot do without a file that it names: where a notebook is graded there is none."""
-    if isinstance(statement, ast.Try | ast.If):  # with a way out
-        return False
-    calls = (node for node in ast.walk(statement) if isinstance(node, ast.Call) and last_word(node.func) in _READERS)
-    return any(isinstance(each.args[0], ast.Constant) and not _writes(each) for each in calls if each.args)
-
-
-def _writes(opened: ast.Call) -> bool:
-    modes = [*opened.args[1:2], *(word.value for word in opened.keywords if word.arg == "mode")]
-    return last_word(opened.func) == "open" and any(
-        isinstance(mode, ast.Constant) and not str(mode.value).startswith("r") for mode in modes
-    )
 
 
 def used_within(function: ast.AST) -> set[str]:

@@ -121,6 +121,8 @@ def namespaces_in(statement: ast.stmt, absent: Set[str]) -> str:
             if id(node) in tested:
                 continue  # `if "google.colab" in sys.modules` reaches nothing
             return f"{root(node)}.{node.attr}"
+        if isinstance(node, ast.Attribute) and node.attr in ("f_globals", "f_locals", "__globals__"):
+            return f".{node.attr}"
         if isinstance(node, ast.Import) and any(alias.name in ("__main__", "builtins") for alias in node.names):
             return f"import {node.names[0].name}"
     return ""

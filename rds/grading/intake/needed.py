@@ -23,11 +23,11 @@ from rds.grading.intake.bindings import (
     last_word,
     mutable,
     not_there,
-    reads_file,
     root,
     stored,
     table_of,
 )
+from rds.grading.intake.files import Files
 from rds.grading.intake.overwritten import SetAgain
 
 _BY_FIRST_ARGUMENT = frozenset({"setattr", "delattr", "setitem", "delitem"})
@@ -56,7 +56,7 @@ def needed(body: Sequence[ast.stmt], wanted: set[str]) -> tuple[set[int], tuple[
     not there: their calls are left out.
     """
     effects, elsewhere = _effects(body)
-    absent = from_elsewhere(body, wanted)
+    absent = from_elsewhere(body, wanted, Files.of(body))
     alike = _names_of_the_same(body, absent)
     facts = [
         _made_and_used(statement, effects, alike, wanted, there) for statement, there in zip(body, absent, strict=True)
@@ -188,11 +188,12 @@ def _leave_out(
 def _able(body: Sequence[ast.stmt], keep: Set[int], absent: Sequence[Set[str]]) -> set[int]:
     """Those of `keep` that need nothing which is not there, or have a way out."""
     kinds = ast.Import | ast.ImportFrom | ast.ClassDef | ast.Try
+    files = Files.of(body)
     return {
         number
         for number in keep
         if isinstance(body[number], kinds)
-        or not (_at_once_names(body[number]) & absent[number] or _reads_file_at_once(body[number]))
+        or not (_at_once_names(body[number]) & absent[number] or _reads_file_at_once(body[number], files))
     }
 
 
@@ -207,8 +208,8 @@ def _rebound(statement: ast.stmt, functions: Mapping[str, ast.FunctionDef]) -> s
     return found.union({each.name for each in patterns if each.name}, *map(stored, trees))
 
 
-def _reads_file_at_once(statement: ast.stmt) -> bool:
-    return not isinstance(statement, followed.FUNCTIONS) and reads_file(statement)
+def _reads_file_at_once(statement: ast.stmt, files: Files) -> bool:
+    return not isinstance(statement, followed.FUNCTIONS) and files.read_by(statement)
 
 
 def _used(body: Sequence[ast.stmt], makes: _Makers, keep: set[int]) -> set[str]:

@@ -18,6 +18,11 @@ from rds.results.units import split_heading
 
 Split = Callable[[str], list[str]]
 _BRACES = re.compile(r"(?P<name>.*?)\s*\{(?P<unit>[^{}]*)\}\s*")
+# what stands in brackets behind a name as a unit does, and says which of two signals of one name it is
+_NO_UNITS = (
+    *("setpoint", "set", "demand", "desired", "target", "commanded", "command", "reference", "ref", "soll"),
+    *("measured", "actual", "act", "feedback", "ist"),
+)
 _BETWEEN = re.compile(r"\s*[/,]\s*|\s+[iI][nN]\s+")  # a name and its unit
 _LABVIEW, _LABVIEW_UNITS, _LABVIEW_TIME = "LabVIEW Measurement", "Y_Unit_Label", "X_Dimension"
 _SCALES = (("scalefactor", "1"), ("offset", "0"), ("unit scalefactor", "1"), ("unit offset", "0"))
@@ -54,6 +59,8 @@ def alternates(units: Sequence[str | None]) -> bool:
 def name_and_unit(cell: str) -> tuple[str, str | None]:
     """Name and unit of a heading; None where it gives none. Without brackets a unit must be one that is known."""
     name, unit = split_heading(cell)
+    if unit is not None and unit.casefold() in _NO_UNITS:
+        return cell.strip(), None  # `x (setpoint)`
     if unit is not None or name in _TIMES_ALONE:
         return name, unit or name
     if cell.startswith("in ") and dimension(cell[3:]) == "time":

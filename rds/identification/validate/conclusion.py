@@ -61,11 +61,13 @@ def _limits(a: Assessment, bands: Bands) -> Iterator[str]:
         yield "in one direction"
     if speed.fitted is not None and largest(speed.here) < bands.covered * largest(speed.fitted):
         yield f"up to {largest(speed.here):.3g} {speed.unit}"
-    elif any(
-        found.fitted is not None and largest(found.here) > bands.beyond * largest(found.fitted)
+    elif beyond := [
+        found
         for found in a.ranges.values()
-    ):
-        yield f"up to the {largest(speed.here):.3g} {speed.unit} tried here"
+        if found.fitted is not None and largest(found.here) > bands.beyond * largest(found.fitted)
+    ]:
+        found = speed if speed in beyond else beyond[0]
+        yield f"up to the {largest(found.here):.3g} {found.unit} tried here"
     if (frequency := frequency_told(a, bands)) is not None:
         yield f"up to {frequency:.2g} Hz"
     if a.log.closed_loop:

@@ -209,7 +209,7 @@ class Explained(NamedTuple):
 
 def _saving(row: dict[str, Any]) -> str:
     more = row["to_save_a_second"]
-    return "no more of it saves a second" if more is None else f"a second less takes {more:.4g} {row['unit']}"
+    return "a larger one saves no whole second" if more is None else f"a second less takes {more:.4g} {row['unit']}"
 
 
 def explained(

@@ -58,6 +58,8 @@ def plan(
     """
     if isinstance(blocks, np.ndarray) and blocks.dtype == SEGMENT:
         raise InputError("the path is one block of several that a plan may take; hand it in as plan([path], limits, T)")
+    if not isinstance(blocks, Iterable):
+        raise InputError(f"blocks = {blocks!r:.60} is no path; hand it in as plan([path], limits, T)")
     if not isinstance(limits, Limits):
         raise InputError(f"limits = {limits!r:.60} must be Limits, as in Limits.of(load_machine('mini-cnc'))")
     if not (isinstance(T, Real) and T > 0.0):

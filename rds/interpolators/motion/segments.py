@@ -183,7 +183,8 @@ def _row(
         row["end"][0, : len(end)] = end
         row["rate"], row["mode"], row["tolerance"], row["collinear"] = rate, mode, tolerance, collinear
         row["line"] = program_line
-    if not (row["mode"][0] in (EXACT_PATH, EXACT_STOP, BLEND) and tolerance >= 0.0 and collinear >= 0.0):
+    # as the row has them: None is NaN there
+    if not (row["mode"][0] in (EXACT_PATH, EXACT_STOP, BLEND) and row["tolerance"] >= 0.0 and row["collinear"] >= 0.0):
         said = f"mode = {mode!r}, tolerance = {tolerance!r} and collinear = {collinear!r} of a move"
         raise InputError(f"{said}: the mode is 0 (G61), 1 (G61.1) or 2 (BLEND, G64), the others are at least 0 mm")
     return row

@@ -93,9 +93,10 @@ class Learned:
                     "lead, or end earlier"
                 )
             if (share := float(self.limited[axis].mean())) > _WOUND:
+                moves = np.ptp(self.results[-1][f"{axis}_reference"]) > 0.0
                 said.append(
-                    f"{axis}: the command was at its limit in {100.0 * share:.0f} % of "
-                    "the last trial, where nothing can be learnt; ask for a slower motion"
+                    f"{axis}: the command was at its limit in {100.0 * share:.0f} % of the last trial, where nothing "
+                    f"can be learnt; {'ask for a slower motion' if moves else 'lower the gains of the law'}"
                 )
         return said
 
@@ -126,6 +127,8 @@ def learn(
     ):
         declared.check(value, name, "learn")
     experiment = Experiment.from_toml(experiment) if isinstance(experiment, str | Path) else experiment
+    if not isinstance(experiment, Experiment):
+        raise InputError(f"learn takes an Experiment, or the name of its file, and not {experiment!r:.60}")
     plan = experiment.plan(mode)
     if obstacle := _obstacle(plan):
         raise InputError(f"this experiment cannot learn: {obstacle}")

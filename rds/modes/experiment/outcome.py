@@ -20,6 +20,7 @@ from rds.core.types import Ending, Model, Source
 from rds.core.values import shown
 from rds.modes import SIMULATION, load_mode
 from rds.modes.loop.plan import Plan
+from rds.modes.loop.program import InterpolatedProgram
 from rds.modes.loop.stopwatch import TIMING_COLUMNS
 from rds.modes.process.environment import sentence
 from rds.modes.process.host import FailedSimulation, Rows, run_plan
@@ -29,6 +30,7 @@ from rds.modes.process.second_look import own_times
 from rds.modes.process.timing import Timing, judge, summary
 from rds.results import Result
 
+_CLOSE = 0.006  # mm: as `rds check` has it
 _LONGEST = 1024  # bits of an int that is kept as a number: beyond some thousand digits Python does not print it
 
 
@@ -46,7 +48,12 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
             columns |= _simulated(plan, rows, sample)
         except FailedSimulation as error:  # what the machine did is kept
             meta["notes"].append(f"the same run simulated has no response to compare with: {error}")
-    meta["notes"] += _of_another_period(plan) + _beyond_travel(plan, columns) + _concluded(plan, columns)
+    meta["notes"] += (
+        _short_of_its_end(plan, rows, columns)
+        + _of_another_period(plan)
+        + _beyond_travel(plan, columns)
+        + _concluded(plan, columns)
+    )
     if mode.real_time:
         meta |= _judged(plan, rows, sample)
         if note := bus_note(meta["drivers"], meta["bus"]):
@@ -62,6 +69,22 @@ def _of_another_period(plan: Plan) -> list[str]:
         "design it for that, or run it with its own"
         for name, law in laws.items()
         if law.sample_period is not None and not isclose(law.sample_period, plan.T)
+    ]
+
+
+def _short_of_its_end(plan: Plan, rows: Rows, columns: dict[str, np.ndarray]) -> list[str]:
+    """A sentence for an interpolator whose last row is not the end of the path."""
+    program = plan.program
+    if not isinstance(program, InterpolatedProgram) or rows.ending is not Ending.DONE:
+        return []
+    end = program.path[-1]["end"][["XYZABC".index(name) for name in program.axes]]
+    last = np.array([columns[f"{name}_reference"][-1] for name in program.axes])
+    away = float(np.linalg.norm(last - end))
+    if away <= max(_CLOSE, program.blu * len(program.axes)):
+        return []
+    return [
+        f"the last row of the interpolator {program.about['interpolator']} is {away:.3g} mm from the end of the path; "
+        "let the last row of each segment be its end"
     ]
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rds.controllers import controller_names, library_controller
+from rds.controllers import controller_names, library_controller, tracking
 from rds.core.adapt import as_controller, as_model, is_control_system
 from rds.core.errors import ContractError, InputError
 from rds.core.interrupt import limited
@@ -34,6 +34,7 @@ class Setting:
     """What parts are made for: the axis, its sample period in s, the user's folder, and what the axis is commanded by.
 
     `limit` is the largest command: the converter's range in V, or `top_speed` (unit/s) for a drive's velocity loop.
+    `on_bus` says that a command acts one sample later than in a simulation.
     """
 
     axis: Axis
@@ -42,6 +43,7 @@ class Setting:
     folder: Path
     command: Command = Command.VOLTAGE
     top_speed: float = inf
+    on_bus: bool = False
 
     def path(self, name: str) -> Path:
         """A file that the user named, from the folder of the experiment."""
@@ -126,7 +128,21 @@ def make_controller(words: TomlTable, setting: Setting, model: Model) -> Control
     else:
         design = model.params if {"tau", "K"} <= set(model.params) else setting.axis.model
     with named(table):
-        return library_controller(name, design, setting.T, setting.limit, unit=setting.axis.unit, **options)
+        law = library_controller(name, design, setting.T, setting.limit, unit=setting.axis.unit, **options)
+        if setting.on_bus:
+            _check_on_bus(law, setting)
+        return law
+
+
+def _check_on_bus(law: Controller, setting: Setting) -> None:
+    """InputError for `tracking`, or what is built on it, where a bus's sample of delay makes the loop unstable."""
+    is_tracking = "observer_pole" in law.params
+    if is_tracking and not tracking.is_stable_on_a_bus(law.params["coefficients"], setting.T):
+        raise InputError(
+            f"controller {law.source.name!r}: on a bus a command acts one sample of {setting.T:g} s later than in a "
+            "simulation, and with these poles or gains the loop is unstable then; choose slower poles or a shorter "
+            "sample period"
+        )
 
 
 def make_drive(words: TomlTable, key: str, setting: Setting, unit: str) -> Signal:

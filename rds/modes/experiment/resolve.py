@@ -78,10 +78,12 @@ def resolve(
         command = commands[axis.name]
         speed = top_speed(axis, machine)
         most = limit if command is Command.VOLTAGE else speed if saturation else inf
-        setting = Setting(axis, T, most, folder, command, speed)
+        setting = Setting(axis, T, most, folder, command, speed, on_bus=mode.drivers == "live")
         made, periods[axis.name], note = _axis_plan(own, setting, driven, samples)
         axes.append(made)
         notes += [note] if note else []
+    if isinstance(leads, Program):
+        notes += machine.too_fast(each.axis.name for each in axes if each.command is Command.VOLTAGE)
     network = read_network(words, folder)
     words.done()
     _check_coupling(axes, words)

@@ -75,10 +75,12 @@ def controlled(
     limit: Callable[[Any], float],
     params: dict[str, Any],
     command: tuple[str, str] = VOLTAGE,
+    states: list[Callable[[], Any]] | None = None,
 ) -> Law:
     """One axis under its own controller; records reference, measured position, command and its signals.
 
-    `params` are the controller's, in a table that may be changed while it runs.
+    `params` are the controller's, in a table that may be changed while it runs. A function that gives the controller's
+    state of now is added to `states`.
     """
     control = controller.control
     state = _first_state(controller)
@@ -100,7 +102,11 @@ def controlled(
         row += r
         row += (y, u)
 
-    return _telling(axis, name, controller, reference, T, limit, params, command) if controller.signals else law
+    if controller.signals:
+        return _telling(axis, name, controller, reference, T, limit, params, command, states)
+    if states is not None:
+        states.append(lambda: state)
+    return law
 
 
 def _telling(
@@ -112,6 +118,7 @@ def _telling(
     limit: Callable[[Any], float],
     params: dict[str, Any],
     command: tuple[str, str],
+    states: list[Callable[[], Any]] | None,
 ) -> Law:
     """`controlled` for a controller with signals: apart, so that one without pays nothing for them."""
     control, observe = controller.control, controller.observe
@@ -146,6 +153,8 @@ def _telling(
         row += r
         row += (y, u, *values)
 
+    if states is not None:
+        states.append(lambda: state)
     return law
 
 
@@ -158,8 +167,9 @@ def coupled(
     limits: Sequence[Callable[[Any], float]],
     params: dict[str, Any],
     command: tuple[str, str] = VOLTAGE,
+    states: list[Callable[[], Any]] | None = None,
 ) -> Law:
-    """Several axes under one controller that gets and gives arrays in axis order; `params` as of `controlled`."""
+    """Several axes under one controller that gets and gives arrays in axis order; the rest as of `controlled`."""
     control, signals = controller.control, tuple(controller.signals)
     state = _first_state(controller)
     n, owners = len(axes), ", ".join(names)
@@ -184,6 +194,8 @@ def coupled(
         for i in range(n):
             row += (*(of_axes[i] for of_axes in values), float(y[i]), commands[i], *(value[i] for value in told))
 
+    if states is not None:
+        states.append(lambda: state)
     return law
 
 

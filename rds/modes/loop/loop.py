@@ -26,6 +26,7 @@ class Loop:
       returns what is to be recorded of them, as it was at this sample.
     - `record(row)`: takes the row: the sample's number, what the laws appended, the acting voltages, the outputs.
     - `finish(k) -> ending`: sample `k` is complete; how the run ends here, if it does.
+    - `notes() -> sentences`: for the result, asked once the run is at its end.
     - `changes(k) -> ending`: live values that were changed are taken before sample `k`, which is the last chance to end
       the run before it is taken. None where the run has no live values. See `loop.changes`.
     """
@@ -40,6 +41,7 @@ class Loop:
     finish: Callable[[int], Ending | None]
     changes: LiveChanges | None = None
     sets_references: bool = False
+    notes: Callable[[], list[str]] = list
     k: int = 0  # the sample to take next, or the one that failed
 
     def run(self, until: int | None = None) -> Ending | None:

@@ -14,6 +14,7 @@ from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
 from rds.core.portable import portable
 from rds.core.types import Controller, Ending, Model
+from rds.core.values import has_nan
 from rds.machines import Axis, Machine
 from rds.machines.converter import converter
 from rds.modes.loop.changes import LiveChanges, plan_changes, stop_channel
@@ -138,7 +139,8 @@ class Plan:
         if program is None:
             references = [plan.reference for plan in self.axes if plan.reference is not None]
             changes = LiveChanges(self.channels(), actions, self.changes, None if guard is None else guard.over)
-            return Drive([*self._laws(params, references), *last], changes)
+            laws, notes = self._laws(params, references)
+            return Drive([*laws, *last], changes, notes=notes)
         live = {name: LiveReference() for name in self.names}
         spindle = None if program.spindle is None else self.names.index(program.spindle)
         follower: Follower = (
@@ -162,7 +164,8 @@ class Plan:
             return (guard is None or guard.over() is None) and execution.waits()
 
         changes = LiveChanges(self.channels(), actions | execution.actions(), self.changes, ends, waits)
-        return Drive([execution.law, *self._laws(params, list(live.values())), *last], changes, sets_references=True)
+        laws, notes = self._laws(params, list(live.values()))
+        return Drive([execution.law, *laws, *last], changes, sets_references=True, notes=notes)
 
     def unwatched(self) -> Plan:
         """The same run, that no following error ends: to go through it again, which ended where it did."""
@@ -217,9 +220,14 @@ class Plan:
             found += [(i, name, unit) for name, unit in plan.model.told.items()]
         return found
 
-    def _laws(self, params: list[dict[str, Any]], references: Sequence[ReferenceSamples | LiveReference]) -> list[Law]:
+    def _laws(
+        self, params: list[dict[str, Any]], references: Sequence[ReferenceSamples | LiveReference]
+    ) -> tuple[list[Law], Callable[[], list[str]]]:
+        """The laws, and what gives the notes on their states once the run is at its end."""
         limits, plans, names = self.limits(), self.axes, self.names
         laws, own = [], iter(params)
+        states: list[Callable[[], Any]] = []
+        owners: list[str] = []
         for group in self._groups():
             first = group[0]
             signal, controller = plans[first].signal, plans[first].controller
@@ -228,13 +236,17 @@ class Plan:
                 continue
             assert controller is not None
             command = _command_of([plans[i] for i in group])
+            watched = None if has_nan(controller.initial_state) else states
+            owners += [", ".join(names[i] for i in group)] if watched is not None else []
             if controller.coupled:
                 of_group = ([names[i] for i in group], controller, [references[i] for i in group])
-                laws.append(coupled(group, *of_group, self.T, [limits[i] for i in group], next(own), command))
+                laws.append(coupled(group, *of_group, self.T, [limits[i] for i in group], next(own), command, watched))
             else:
                 of_axis = (first, names[first], controller, references[first], self.T, limits[first])
-                laws.append(controlled(*of_axis, next(own), command))
-        return laws
+                laws.append(controlled(*of_axis, next(own), command, watched))
+        return laws, lambda: [
+            _of_lost_state(name) for name, state in zip(owners, states, strict=True) if has_nan(state())
+        ]
 
     def columns(self, followed: str | None, simulates_plant: bool = False) -> tuple[list[str], dict[str, str]]:
         """The names of a record's columns in the order of the loop's rows, and their units.
@@ -285,6 +297,14 @@ def _command_of(plans: Sequence[AxisPlan]) -> tuple[str, str]:
     return " or ".join(what), " or ".join(unit)
 
 
+def _of_lost_state(name: str) -> str:
+    """A voltage may stay finite on a state that holds NaN: min() and max() turn it into a limit."""
+    return (
+        f"the state of the controller of {name} holds NaN at the end of the run, so its voltages may not be what was "
+        "meant; look for a division by zero, a root, a logarithm or inf - inf (`rds check` tells since when)"
+    )
+
+
 @dataclass(frozen=True)
 class Drive:
     """What drives the axes of a run that has begun: its laws, and what takes the changes of live values."""
@@ -292,6 +312,7 @@ class Drive:
     laws: list[Law]
     changes: LiveChanges
     sets_references: bool = False  # the first of the laws sets the references of the others
+    notes: Callable[[], list[str]] = list  # for the result, once the run is at its end
 
 
 def dump(plan: Plan) -> bytes:

@@ -131,7 +131,8 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
         taken = tuple(timed(changes.taken, plan.T))
         raise FailedSimulation(reason, Rows(columns, units, values, Ending.FAULT, reason, {}, changes=taken)) from error
     values = np.frombuffer(recorded).reshape(-1, len(columns))
-    return Rows(columns, units, values, ending, changes.reason, {}, changes=tuple(timed(changes.taken, plan.T)))
+    taken = tuple(timed(changes.taken, plan.T))
+    return Rows(columns, units, values, ending, changes.reason, {}, tuple(loop.notes()), taken)
 
 
 def _in_target(plan: Plan, directory: Path, lock: int, progress: Progress | None, live: Live) -> Rows:
@@ -147,7 +148,7 @@ def _in_target(plan: Plan, directory: Path, lock: int, progress: Progress | None
     ending, reason = Ending(report["ending"]), report.get("reason", "")
     if has_rows:
         values, changes = read_raw(directory)[1], tuple(read_changes(directory))
-        return Rows(columns, units, values, ending, reason, report, changes=changes)
+        return Rows(columns, units, values, ending, reason, report, tuple(report.get("notes", ())), changes)
     (directory / UNSTARTED).unlink()
     return Rows(columns, units, np.empty((0, len(columns))), ending, reason, report)
 

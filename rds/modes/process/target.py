@@ -92,7 +92,7 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
                 report["ending"] = loop.run()
             finally:
                 stopwatch.end_copy()
-        report["reason"] = loop.changes.reason
+        report |= {"reason": loop.changes.reason, "notes": loop.notes()}
         if report["ending"] is Ending.DONE:
             drivers.confirm()
     except _Stopped as stopped:

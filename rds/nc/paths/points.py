@@ -24,6 +24,7 @@ TOLERANCE = Quantity("how far arcs may be from the lines between the points", "m
 MOST_POINTS = 2_000_000
 _LONGEST_LINE = 1000  # characters
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_DECIMAL_COMMAS = re.compile(r"[+-]?\d+,\d+(,?[ \t]+[+-]?\d+,\d+)+", re.ASCII)
 _HEADING = re.compile(r"\s*([A-Za-z]\w*?)(?:_(\w+)|\s*[\[(]\s*([^\])]*?)\s*[\])])?\s*(?:[,;\s]|$)")
 _UNITS_COMMENT = re.compile(r"#\s*units?\s*[:=]?\s*(\S+)\s*", re.IGNORECASE)
 
@@ -142,6 +143,8 @@ class _Reader:
 
     def _point(self, line: int, body: str) -> None:
         separator = ";" if ";" in body else "," if "," in body else None
+        if _DECIMAL_COMMAS.fullmatch(body):
+            raise self.fault(line, f"{body!r} has decimal commas; write decimals with a point")
         fields = [word.strip() for word in body.split(separator)]
         if not self.columns:
             if len(fields) not in (2, 3):

@@ -23,7 +23,7 @@ from rds.bus.modules.segments import Equations, NodeSegment, arc, line
 from rds.core.errors import InputError
 from rds.core.progress import Progress
 from rds.interpolators.motion.limits import Limits
-from rds.interpolators.motion.segments import AXES, LINE, in_plane
+from rds.interpolators.motion.segments import AXES, LINE, XY, YZ, ZX, in_plane
 from rds.machines import Machine
 from rds.modes.loop.program import Program, dwell_samples
 from rds.nc.run.prepare import Prepared, prepare
@@ -31,6 +31,7 @@ from rds.nc.setup import Setup
 
 MOTIONS = ("plan", "constant")
 _MOST_STEPS = 65_535  # of a segment in method B
+_OFF_CIRCLE = 0.03  # mm: what the language lets any arc have
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def serial_motion(
             _hold(nodes, counts, after, each.value, period)
         elif each.kind == "spindle":
             speeds.append((each.sample, 0 if after is None else sum(counts[: after + 1]), each.value))
-    notes = list(prepared.notes)
+    notes = [*prepared.notes, *_off_their_circles(prepared.path)]
     if kinds := sorted({each.kind for each in happenings} - {"end", "dwell", "spindle"}):
         notes.append(f"nodes move axes and spindle only; not carried out of the program: {', '.join(kinds)}")
     if motion == "plan":
@@ -201,6 +202,25 @@ def _equations(
             else:
                 nodes[i].append(line(start, end, steps))
     return nodes, counts
+
+
+def _off_their_circles(path: np.ndarray) -> list[str]:
+    """A note on the arc whose end is farthest off the circle about its centre, where that is much."""
+    off = np.zeros(len(path))
+    for plane in (XY, ZX, YZ):
+        some, (first, second, _) = path["plane"] == plane, in_plane(plane)
+        start, end = (
+            np.hypot(*(path[each][some][:, k] - path["centre"][some][:, k] for k in (first, second)))
+            for each in ("start", "end")
+        )
+        off[some] = np.abs(end - start)
+    worst = int(off.argmax())
+    if off[worst] <= _OFF_CIRCLE:
+        return []
+    return [
+        f"the arc of line {path['line'][worst]} ends {1e3 * off[worst]:.0f} µm off the circle about its centre: method "
+        "B, which keeps the radius, makes a step of that in the next segment; correct the end or the centre"
+    ]
 
 
 def _hold(

@@ -19,6 +19,7 @@ STILL = 0.1  # s without a count until the axis counts as standing
 HOST_SILENCE = 2.0  # s without a word of the host until the motion ends
 HOMING_DUTY = 200.0
 LEAVES = 0.05  # of the travel: off a limit switch within this way, or its wire is broken
+SAME_EDGE = 8  # counts: a limit switch closes where it opened, a wire anywhere
 LONGEST_JOG = 60.0  # s
 _TOOL_STILL = 0.5  # rev/min
 _AT_START = pid.Memory()
@@ -221,7 +222,10 @@ class Mover:
             if plant.counts - motion.turned > way:  # what opened was a wire: the zero is not here
                 self._settle(Result.STOPPED_BY_LIMIT, now)
         elif motion.direction > 0:
-            if motion.found:
+            edge = round(low.position * plant.data.counts_per_unit)
+            if motion.found and abs(low.mark - edge) > SAME_EDGE:  # what opened and closed was a wire
+                self._settle(Result.STOPPED_BY_LIMIT, now)
+            elif motion.found:
                 self.homed = True
                 self._settle(Result.CARRIED_OUT, now)
             else:  # it stood on the switch at the start: now approach it
