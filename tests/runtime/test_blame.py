@@ -18,6 +18,7 @@ from lost_machines import unless_lost
 from misbehaviour import busy, every, send
 
 import rds
+from rds.modes.process import second_look
 
 pytestmark = pytest.mark.realtime
 
@@ -58,9 +59,12 @@ def test_a_single_slow_call_comes_back_when_it_is_made_again(experiment: Maker) 
 
 
 @pytest.mark.parametrize("wait", [busy, time.sleep])
-def test_a_stall_longer_than_any_patience_is_missed(experiment: Maker, wait: Any) -> None:
+def test_a_stall_longer_than_any_patience_is_missed(
+    experiment: Maker, wait: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A second look that goes through the whole run with a fixed patience gave up, and called the computer slow."""
-    stalls_once = experiment(every(300, lambda: wait(2.6)), duration=0.4)
+    monkeypatch.setattr(second_look, "STARTING", 1.0)  # s: what a fixed patience would be
+    stalls_once = experiment(every(300, lambda: wait(1.0)), duration=0.4)
     result = unless_lost(lambda: stalls_once.run("emulation"))
     assert result.verdict == "missed"
 

@@ -502,7 +502,7 @@ def test_a_new_run_replaces_an_earlier_one_in_its_folder(experiment: Maker, duri
     def look() -> None:
         seen.append(rds.open_result(alone / "run"))
 
-    experiment(duration=1.0).run("implementation", out=alone / "run", progress=during(look, 600))
+    experiment(duration=0.6).run("implementation", out=alone / "run", progress=during(look, 300))
     assert seen[0].meta["ending"] == "killed"  # nothing better is known of it so far
     assert seen[0].mode == "implementation"
 
