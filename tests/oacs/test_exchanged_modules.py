@@ -190,7 +190,7 @@ def test_a_slide_is_exchanged_in_a_part_program_and_accepted_at_the_prompt(
     """All of it in processes of their own: the command in a terminal, the modules; the slide's is killed."""
     serve("drill,Z,A")
     slide = serve("X")
-    (tmp_path / "part.ngc").write_text("G21 G90 G94 G61\nG1 X2 Z-1 F120\nX0 Z0\nM2\n")
+    (tmp_path / "part.ngc").write_text("G21 G90 G94 G61\nG1 X2 Z-1 F60\nX0 Z0\nM2\n")
     bus = f'[bus]\ndialect = "oacs"\nchannel = "{channel}"\n'
     (tmp_path / "bus.toml").write_text(f'machine = "mrmt-oacs"\nsample_period = 0.01\ncontroller = "pid"\n{bus}')
     command = [sys.executable, "-m", "rds", "nc", "run", "part.ngc", "--controller", "bus.toml", "-m", "implementation"]
