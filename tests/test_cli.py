@@ -94,8 +94,8 @@ def test_a_simulation(folder: Path) -> None:
 
 
 def test_in_words(folder: Path) -> None:
-    done = command("run", "e.toml", "--out", "out")
-    assert (done.returncode, done.stderr) == (0, "")
+    done = call("run", "e.toml", "--out", "out")
+    assert (done.exit_code, done.stderr) == (0, "")
     assert "Tracking error, simulation" in done.stdout
     assert "report: out/report.html" in done.stdout
     assert "\x1b" not in done.stdout
@@ -104,10 +104,10 @@ def test_in_words(folder: Path) -> None:
 @pytest.mark.realtime
 def test_real_time(folder: Path) -> None:
     (folder / "e.toml").write_text(SIMULATION.replace("duration = 2.0", "duration = 1.0"))
-    done = command("run", "e.toml", "--mode", "implementation", "--out", "out", "--json")
+    done = call("run", "e.toml", "--mode", "implementation", "--out", "out", "--json")
     said = only_json(done.stdout)
     assert said["verdict"] in ("met", "missed", "void")
-    assert done.returncode == (1 if said["verdict"] == "missed" else 0)
+    assert done.exit_code == (1 if said["verdict"] == "missed" else 0)
     assert said["verdict"] == "met" or f"timing {said['verdict']}" in done.stderr
     assert said["axes"]["X"]["fit_percent"] > 50
     for stage in ("lateness", "io", "compute", "model"):
@@ -120,9 +120,9 @@ def test_real_time(folder: Path) -> None:
 def test_a_missed_verdict_is_exit_code_1(folder: Path) -> None:
     (folder / "law.py").write_text(SLOW)
     (folder / "e.toml").write_text(SIMULATION.replace("duration = 2.0", "duration = 0.5"))
-    done = command("run", "e.toml", "-m", "emulation", "-o", "out", "--json")
+    done = call("run", "e.toml", "-m", "emulation", "-o", "out", "--json")
     said = only_json(done.stdout)
-    assert (done.returncode, said["verdict"]) == (1, "missed")
+    assert (done.exit_code, said["verdict"]) == (1, "missed")
     assert "rds: timing missed: " in done.stderr
     assert "control() and the model took " in done.stderr
     (folder / "law.py").write_text(LAW)  # the record says what ran, not what is there now
@@ -243,11 +243,11 @@ def test_compare(folder: Path) -> None:
     same, different = call("compare", "a", "a", "--json"), call("compare", "a", "b/result.csv", "--json")
     assert same.exit_code == different.exit_code == 0
     assert only_json(same.stdout) != only_json(different.stdout)
-    assert "X" in command("compare", "a", "b").stdout
+    assert "X" in call("compare", "a", "b").stdout
 
 
 def test_machine_list(folder: Path) -> None:
-    said = only_json(command("machine", "list", "--json").stdout)
+    said = only_json(call("machine", "list", "--json").stdout)
     assert said["mini-cnc"]["axes"] == ["X", "Y", "Z", "spindle"]
     assert "-75 to 75 mm" in call("machine", "list").stdout
 
@@ -267,7 +267,7 @@ def test_a_served_machine_ends_by_ctrl_c(folder: Path) -> None:
     try:
         assert "Ctrl-C ends" in served.stderr.readline()
         (folder / "e.toml").write_text(SIMULATION.replace("duration = 2.0", "duration = 0.2"))
-        done = command("run", "e.toml", "-m", "implementation", "-o", "out", "--json")
+        done = call("run", "e.toml", "-m", "implementation", "-o", "out", "--json")
         assert only_json(done.stdout)["mode"] == "implementation"
         served.stdin.write("2 emergency on\n")  # a hand at the button of X
         served.stdin.flush()

@@ -115,17 +115,20 @@ class Imported(NamedTuple):
     node: ast.Import | ast.ImportFrom
     in_function: bool
     for_types: bool  # in the body of `if TYPE_CHECKING`
+    at_head: bool  # in nothing, not even a condition
 
 
 @cache
 def _statements(path: Path) -> list[Imported]:
     """All imports of a file. Only statements hold statements: expressions, which are most of a file, are not walked."""
     found = []
-    todo: list[tuple[ast.AST, bool, bool]] = [(ast.parse(path.read_text(encoding="utf-8")), False, False)]
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    todo: list[tuple[ast.AST, bool, bool]] = [(tree, False, False)]
+    heads = {id(node) for node in tree.body}
     while todo:
         node, inside, typed = todo.pop()
         if isinstance(node, ast.Import | ast.ImportFrom):
-            found.append(Imported(node, inside, typed))
+            found.append(Imported(node, inside, typed, id(node) in heads))
         inside = inside or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         checks = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
         for name in ("body", "orelse", "finalbody", "handlers", "cases"):
@@ -138,7 +141,7 @@ def _statements(path: Path) -> list[Imported]:
 def imports(path: Path) -> list[tuple[str, bool]]:
     """The modules of rds that a file imports, and whether at its top."""
     found = []
-    for node, in_function, _ in _statements(path):
+    for node, in_function, *_ in _statements(path):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         else:
@@ -152,7 +155,7 @@ def imports(path: Path) -> list[tuple[str, bool]]:
 def imported_when_running(path: Path) -> set[str]:
     """The files of rds that a file imports, also inside functions, but not for type checking alone."""
     names = []
-    for node, _, for_types in _statements(path):
+    for node, _, for_types, _ in _statements(path):
         if for_types:
             continue
         if isinstance(node, ast.Import):
@@ -305,9 +308,8 @@ def test_what_an_installation_may_lack_is_imported_late() -> None:
     optional = {module for module, (extra, _) in extras._PACKAGES.items() if extra}
     for path in ROOT.rglob("*.py"):
         place = path.relative_to(ROOT).as_posix()
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            names = [each.name for each in node.names] if isinstance(node, ast.Import) else []
-            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        for node in (each.node for each in _statements(path) if each.at_head):
+            names = [each.name for each in node.names] if isinstance(node, ast.Import) else [node.module or ""]
             for package in {name.partition(".")[0] for name in names} & optional:
                 assert place.startswith(("panels/", may.get(package, "panels/"))), f"{place} imports {package}"
 
@@ -317,7 +319,7 @@ def test_modules_of_unix_are_imported_by_what_makes_grades_alone() -> None:
     unix = ("fcntl", "resource", "pwd", "grp", "termios", "tty")
     for path in ROOT.rglob("*.py"):
         place = path.relative_to(ROOT).as_posix()
-        heads = [node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.Import)]
+        heads = [each.node for each in _statements(path) if each.at_head and isinstance(each.node, ast.Import)]
         if {name.name for node in heads for name in node.names} & set(unix):
             assert place.startswith(("grading/sandbox/", "grading/batch/scratch.py", "core/parallel/remote.py")), place
     missing = f"import sys, subprocess, tempfile, IPython\nfor name in {unix}: sys.modules[name] = None\n"

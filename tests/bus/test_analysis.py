@@ -49,7 +49,7 @@ def task_sets(draw: st.DrawFn, jitter: bool = True) -> list[Task]:
 
 
 @given(task_sets(), st.data())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_no_schedule_exceeds_the_analysis(tasks: list[Task], data: st.DataObject) -> None:
     offsets = [data.draw(st.integers(0, task.period)) for task in tasks]
     late = [data.draw(st.lists(st.integers(0, 100), min_size=1, max_size=5)) for _ in tasks]
@@ -61,7 +61,7 @@ def test_no_schedule_exceeds_the_analysis(tasks: list[Task], data: st.DataObject
 
 
 @given(task_sets())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_the_critical_instant_reaches_the_bound(tasks: list[Task]) -> None:
     """All released at their latest at once, and after it without delay; the longest lower one has started just before.
 
@@ -231,7 +231,7 @@ def test_a_cycle_that_does_not_fit_is_not_called_met() -> None:
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 def test_no_cycle_exceeds_the_analysis(data: st.DataObject) -> None:
     """Random tables: a message releases others, and these others; some beside them; random lengths, jitters, delays."""
     period = data.draw(st.sampled_from([1e-3, 1.3e-3, 2e-3]), "period")

@@ -324,7 +324,7 @@ def run(own: rds.Experiment, folder: Path, ending: str) -> Result:
 @pytest.mark.realtime
 def test_an_emulation_on_the_timed_bus_repeats_simulation(tmp_path: Path) -> None:
     """1 kHz with four axes at 1 Mbit/s: 0.6 ms of every ms are on the wire."""
-    own = experiment(0.001, 1.0, bitrate=MBIT)
+    own = experiment(0.001, 0.5, bitrate=MBIT)
     simulated, emulated = own.run("simulation"), own.run("emulation", out=tmp_path / "out")
     assert emulated.meta["ending"] == "done"
     for column in simulated.columns:

@@ -12,11 +12,13 @@ from pathlib import Path
 
 import can
 import pytest
+from typer.testing import CliRunner
 from waiting import wait_for
 
 from bus_tools.made_frames import frame
 from rds.bus.hub.faults import Faults
 from rds.bus.tools.logs import LogFile, LogWriter
+from rds.cli.main import app
 
 Opener = Callable[..., can.BusABC]
 
@@ -45,6 +47,13 @@ def end(process: subprocess.Popen[str], code: int = 0) -> tuple[str, str]:
     return out, err
 
 
+def here(*arguments: str, code: int = 0) -> tuple[str, str]:
+    """What `rds bus ARGUMENTS --channel test` says on stdout and stderr, in this process."""
+    done = CliRunner().invoke(app, ["bus", *arguments, "--channel", "test"])
+    assert done.exit_code == code, done.stderr
+    return done.stdout, done.stderr
+
+
 def busy(bus: can.BusABC) -> can.CyclicSendTaskABC:
     return bus.send_periodic(frame(0x700, b"\x01\x02"), 0.005)
 
@@ -62,9 +71,9 @@ def test_monitor_prints_one_json_object(rds: Callable[..., subprocess.Popen[str]
     assert seen["lost"] == 0 and not seen["faults"] and not err
 
 
-def test_monitor_prints_one_table_in_a_pipe(rds: Callable[..., subprocess.Popen[str]], open_bus: Opener) -> None:
+def test_monitor_prints_one_table_in_a_pipe(open_bus: Opener) -> None:
     task = busy(open_bus())
-    out, _ = end(rds("monitor", "--seconds", "0.5"))
+    out, _ = here("monitor", "--seconds", "0.5")
     task.stop()
     assert out.count("identifier") == 1 and "0x700" in out and "rds:test: active" in out
 
@@ -104,17 +113,15 @@ def test_record_until_ctrl_c_and_replay(
     assert found == list(range(50)) and bus.recv(0.2) is None
 
 
-def test_a_replay_says_that_a_log_has_frames_of_several_channels(
-    rds: Callable[..., subprocess.Popen[str]], open_bus: Opener, tmp_path: Path
-) -> None:
+def test_a_replay_says_that_a_log_has_frames_of_several_channels(open_bus: Opener, tmp_path: Path) -> None:
     open_bus()
     path = tmp_path / "a.log"
     path.write_text("(1.0) can0 790#01\n(1.1) can1 790#02\n")
-    out, err = end(rds("replay", str(path), "--speed", "inf", "--json"))
+    out, err = here("replay", str(path), "--speed", "inf", "--json")
     assert json.loads(out)["channels"] == ["can0", "can1"]
     assert "frames of 2 channels (can0, can1) went onto this one bus" in err
     path.write_text("(1.0) can0 790#01\n(1.1) can0 790#02\n")
-    assert "channels" not in end(rds("replay", str(path), "--speed", "inf"))[1]
+    assert "channels" not in here("replay", str(path), "--speed", "inf")[1]
 
 
 def test_a_recording_that_is_not_complete_says_so(
@@ -146,14 +153,12 @@ def test_a_recording_that_is_not_complete_says_so(
         (["serve-socketcand", "--host", "0.0.0.0"], "loopback"),
     ],
 )
-def test_bad_input_is_refused_with_a_sentence(
-    arguments: list[str], word: str, rds: Callable[..., subprocess.Popen[str]], tmp_path: Path
-) -> None:
+def test_bad_input_is_refused_with_a_sentence(arguments: list[str], word: str, tmp_path: Path) -> None:
     (tmp_path / "bad.log").write_text("rubbish\n")
     log = LogWriter(tmp_path / "exists.log")
     log.write(frame(0x700))
     log.close()
-    out, err = end(rds(*(argument.format(here=tmp_path) for argument in arguments)), 2)
+    out, err = here(*(argument.format(here=tmp_path) for argument in arguments), code=2)
     assert not out
     assert err.startswith("rds: ") and word in err and "Traceback" not in err
     assert len(err.splitlines()) == 1
@@ -175,15 +180,13 @@ def test_a_socketcand_server_until_ctrl_c(rds: Callable[..., subprocess.Popen[st
     assert "left out" not in end(server)[1]
 
 
-def test_commands_are_replayed_only_by_one_host(
-    rds: Callable[..., subprocess.Popen[str]], open_bus: Opener, tmp_path: Path
-) -> None:
+def test_commands_are_replayed_only_by_one_host(open_bus: Opener, tmp_path: Path) -> None:
     from rds.bus.hub.command import Command
 
     log = LogWriter(tmp_path / "a.log")
     log.write(frame(0x010, bytes(8)))
     log.close()
     with Command("test"):
-        _, err = end(rds("replay", str(tmp_path / "a.log"), "--with-commands"), 2)
+        _, err = here("replay", str(tmp_path / "a.log"), "--with-commands", code=2)
     assert "another run commands the machine" in err
-    end(rds("replay", str(tmp_path / "a.log"), "--with-commands"))
+    here("replay", str(tmp_path / "a.log"), "--with-commands")

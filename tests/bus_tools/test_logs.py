@@ -337,7 +337,7 @@ def test_what_is_no_database_is_refused(tmp_path: Path) -> None:
 
 
 @given(data=st.binary(max_size=400), ending=st.sampled_from(FORMATS))
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_rubbish_is_refused_or_read_but_never_anything_else(data: bytes, ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"rubbish.{ending}"
     path.write_bytes(data)
@@ -348,7 +348,7 @@ def test_rubbish_is_refused_or_read_but_never_anything_else(data: bytes, ending:
 
 
 @given(cut=st.integers(0, 10_000), ending=st.sampled_from([*FORMATS[:6]]), flip=st.integers(0, 255))
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_log_with_one_wrong_byte_is_refused_or_read(cut: int, ending: str, flip: int, tmp_path: Path) -> None:
     path = tmp_path / f"wrong.{ending}"
     path.unlink(missing_ok=True)

@@ -84,7 +84,7 @@ def test_reset_brings_the_defaults_back(rig: Rig) -> None:
     assert rig.read(0x6081) == 5000
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.lists(st.binary(min_size=0, max_size=8), max_size=20))
 def test_no_request_breaks_the_server(requests: list[bytes]) -> None:
     rig = Rig(load_machine("mini-cnc"))
@@ -94,7 +94,7 @@ def test_no_request_breaks_the_server(requests: list[bytes]) -> None:
     assert rig.read(0x1018, 2) == 0x402
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     st.lists(
         st.tuples(

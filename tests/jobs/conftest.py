@@ -6,6 +6,7 @@ import json
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,7 @@ class Client:
             assert told["state"] != "over", told
             if wanted.items() <= told.items():
                 return told
+            time.sleep(0.02)  # else both would use their processors, which the run needs
 
     def close(self) -> None:
         self.lines.close()

@@ -143,7 +143,7 @@ def test_emulation_repeats_simulation_to_the_bit() -> None:
     """X, Y and Z together, friction, converter and encoder: what a busy computer does to time is not in the data."""
     both = rds.Experiment(
         axis=("X", "Y", "Z"),
-        duration=1.0,
+        duration=0.6,
         reference=rds.sinusoid(5.0, 1.0),
         controller=TRACKING,
         overrides={"Y": {"reference": rds.square(1.0, 3.0), "controller": {"name": "pid"}}},

@@ -125,7 +125,6 @@ def test_an_emergency_stop_that_nobody_acknowledges_fails(rds: Rds, bus: can.Bus
     ("words", "number"),
     [
         (["move", "--by", "100"], signal.SIGINT),
-        (["jog", "1", "--seconds", "20"], signal.SIGINT),
         (["jog", "1", "--seconds", "20"], signal.SIGTERM),
         (["jog", "1", "--seconds", "20"], signal.SIGHUP),
         (["step", "--by", "100"], signal.SIGTERM),

@@ -5,10 +5,9 @@ each of them would import asammdf and pandas, for seconds, where a test looks at
 """
 
 import sys
-from importlib.abc import MetaPathFinder
 
 
-class _NotYet(MetaPathFinder):
+class _NotYet:  # no importlib.abc.MetaPathFinder: to import that takes as long as Python's own start
     """Python does not find asammdf while python-can is being imported."""
 
     def find_spec(self, name, path=None, target=None):

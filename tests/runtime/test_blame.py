@@ -18,6 +18,7 @@ from lost_machines import unless_lost
 from misbehaviour import busy, every, send
 
 import rds
+from rds.modes.process import second_look
 
 pytestmark = pytest.mark.realtime
 
@@ -34,7 +35,7 @@ Maker = Callable[..., rds.Experiment]
     ],
 )
 def test_two_milliseconds_of_one_are_missed(experiment: Maker, wait: Any, samples: int, mode: str) -> None:
-    slow = experiment(every(samples, lambda: wait(0.002)), duration=0.5)
+    slow = experiment(every(samples, lambda: wait(0.002)), duration=0.25 if samples == 1 else 0.5)
     result = unless_lost(lambda: slow.run(mode))
     assert result.verdict == "missed"
     assert "control() and the model took " in result.meta["verdict_reason"]
@@ -47,20 +48,23 @@ def test_a_slow_model_is_missed(experiment: Maker) -> None:
         busy(0.0015)
         return x
 
-    slow = experiment(model=advance, duration=0.5)
+    slow = experiment(model=advance, duration=0.25)
     assert unless_lost(lambda: slow.run("emulation")).verdict == "missed"
 
 
 def test_a_single_slow_call_comes_back_when_it_is_made_again(experiment: Maker) -> None:
-    slow_once = experiment(every(700, lambda: busy(0.03)), duration=1.0)
+    slow_once = experiment(every(300, lambda: busy(0.03)), duration=0.4)
     result = unless_lost(lambda: slow_once.run("emulation"))
     assert result.verdict == "missed"
 
 
 @pytest.mark.parametrize("wait", [busy, time.sleep])
-def test_a_stall_longer_than_any_patience_is_missed(experiment: Maker, wait: Any) -> None:
+def test_a_stall_longer_than_any_patience_is_missed(
+    experiment: Maker, wait: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A second look that goes through the whole run with a fixed patience gave up, and called the computer slow."""
-    stalls_once = experiment(every(300, lambda: wait(2.6)), duration=0.4)
+    monkeypatch.setattr(second_look, "STARTING", 1.0)  # s: what a fixed patience would be
+    stalls_once = experiment(every(300, lambda: wait(1.0)), duration=0.4)
     result = unless_lost(lambda: stalls_once.run("emulation"))
     assert result.verdict == "missed"
 
@@ -100,13 +104,13 @@ def test_who_is_stopped_is_not_blamed(experiment: Maker, alone: Path) -> None:
     stops = []
 
     def stop_now_and_then(samples: int, of: int) -> None:
-        if samples > 200 * (len(stops) + 1) and len(stops) < 6:
+        if samples > 120 * (len(stops) + 1) and len(stops) < 6:
             stops.append(samples)
             send(alone / "run", "target", signal.SIGSTOP)
             time.sleep(0.05)
             send(alone / "run", "target", signal.SIGCONT)
 
-    result = experiment().run("emulation", out=alone / "run", progress=stop_now_and_then)
+    result = experiment(duration=1.3).run("emulation", out=alone / "run", progress=stop_now_and_then)
     assert len(stops) >= 3
     assert result.verdict == "void"
     assert result.meta["timing"]["late"] >= 3 * 40
@@ -125,7 +129,7 @@ def test_who_is_stopped_and_slow_is_blamed(experiment: Maker, alone: Path) -> No
                 send(alone / "run", "target", signal.SIGCONT)
                 stops.append(samples)
 
-    slow = experiment(every(1, lambda: busy(0.002)), duration=1.0)
+    slow = experiment(every(1, lambda: busy(0.002)), duration=0.5)
     assert slow.run("emulation", out=alone / "run", progress=stop_now_and_then).verdict == "missed"
     assert stops
 

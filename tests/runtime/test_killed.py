@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from lost_machines import TRIES, unless_lost
 from misbehaviour import every, process, send
+from typer.testing import CliRunner
 from waiting import wait_for
 
 import rds
@@ -28,6 +29,7 @@ from rds.bus.modules.calling import find_machine
 from rds.bus.modules.dialects import server_module
 from rds.bus.modules.rds.frames import CALL, Kind, Status, answer_identifier, decode_answer
 from rds.bus.modules.server_process import start_server
+from rds.cli.main import app
 from rds.core.contracts import Counters
 from rds.modes.loop.changes import stop_channel
 from rds.modes.loop.live_values import LiveValues
@@ -370,9 +372,8 @@ def test_a_machine_that_is_not_there(alone: Path) -> None:
     """On a bus that is not the built-in one, nothing is started in its place."""
     bus = 'interface = "virtual"\n'
     (alone / "e.toml").write_text(FILE.format(mode="implementation", duration=1.0, channel="empty") + bus)
-    command = [sys.executable, "-m", "rds.cli.main", "run", "e.toml", "--out", "run", "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout) == (2, "")
+    done = CliRunner().invoke(app, ["run", "e.toml", "--out", "run", "--json"])
+    assert (done.exit_code, done.stdout) == (2, "")
     assert "no answer from X (node 2) on bus virtual:empty" in done.stderr
     assert "rds machine serve mini-cnc" in done.stderr
     assert not (alone / "run").exists()
@@ -502,7 +503,7 @@ def test_a_new_run_replaces_an_earlier_one_in_its_folder(experiment: Maker, duri
     def look() -> None:
         seen.append(rds.open_result(alone / "run"))
 
-    experiment(duration=1.0).run("implementation", out=alone / "run", progress=during(look, 600))
+    experiment(duration=0.6).run("implementation", out=alone / "run", progress=during(look, 300))
     assert seen[0].meta["ending"] == "killed"  # nothing better is known of it so far
     assert seen[0].mode == "implementation"
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import can
 import pytest
+from typer.testing import CliRunner, Result
 from waiting import wait_for
 
 from rds.bus.modules.cia402.codes import State, state_of
@@ -23,6 +24,7 @@ from rds.bus.modules.dialects import server_module
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.frames import Status
 from rds.bus.tools.estop import reset_everything
+from rds.cli.main import app
 from rds.core.errors import MachineError
 from rds.machines import load_machine
 from rds.results import open_result
@@ -90,10 +92,9 @@ class Bench:
         (folder / "run.toml").write_text(text)
         return self.start(str(HERE / "run_process.py"), str(folder / "run.toml"), str(folder / "out"))
 
-    def rds(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+    def rds(self, *arguments: str) -> Result:
         """The command line, on this channel."""
-        command = [sys.executable, "-m", "rds.cli.main", *arguments, "--channel", self.channel]
-        return subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=60)
+        return CliRunner().invoke(app, [*arguments, "--channel", self.channel])
 
     @contextlib.contextmanager
     def bus(self) -> Iterator[can.BusABC]:

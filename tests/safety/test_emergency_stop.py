@@ -18,7 +18,7 @@ def test_from_the_command_line_in_a_run(bench: Bench, tmp_path: Path) -> None:
     bench.serve()
     run = bench.run(tmp_path)
     stop = bench.rds("estop")
-    assert stop.returncode == 0, stop.stderr
+    assert stop.exit_code == 0, stop.stderr
     assert f"acknowledged by {bench.node}" in stop.stdout
     ending, reason = ended(run, tmp_path)
     assert ending == "machine lost" and "emergency stop" in reason

@@ -20,7 +20,7 @@ def test_a_clash_is_refused_with_both_named(bench: Bench) -> None:
     for said in (scan.stderr, reason):
         serials = re.findall(r"serial number (\d+)", said)
         assert f"{bench.node} is used 2 times" in said and len(set(serials)) == 2, said
-    assert scan.returncode == 2 and scan.stdout == ""
+    assert scan.exit_code == 2 and scan.stdout == ""
     assert bench.counts() == bench.start_counts, "nothing has moved"
 
 
@@ -38,5 +38,5 @@ def test_modules_of_two_dialects_clash_too(bench: Bench) -> None:
     bench.serve("Z")  # node 4
     bench.serve("X", "oacs")  # number 4
     scan = bench.rds("scan")
-    assert scan.returncode == 2 and "number 4 is used 2 times" in scan.stderr
+    assert scan.exit_code == 2 and "number 4 is used 2 times" in scan.stderr
     assert "module with serial number" in scan.stderr and "LinrXa with serial number" in scan.stderr

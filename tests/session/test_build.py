@@ -71,7 +71,7 @@ def test_a_fault_is_marked_at_its_line(
     from rds import checks
 
     real = checks.check_file
-    monkeypatch.setattr(checks, "check_file", lambda path, T, **more: real(path, T, time_limit=4.0, **more))
+    monkeypatch.setattr(checks, "check_file", lambda path, T, **more: real(path, T, time_limit=2.0, **more))
     checked = Builds().check("controller", write(tmp_path, "mine.py", text), 0.001)
     assert not checked.ok
     assert any(mark.line in (line, line + 1) and words in mark.text for mark in checked.marks), checked.marks

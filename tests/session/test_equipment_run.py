@@ -62,6 +62,7 @@ def test_a_run_that_is_being_saved_is_not_cut_short(tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.realtime
+@pytest.mark.usefixtures("nothing_drawn")
 def test_the_emergency_stop_reaches_a_machine_that_a_run_started_for_itself(tmp_path: Path) -> None:
     equipment = Equipment(Session(tmp_path), "control")
     equipment.choices.set("mode", "implementation")
@@ -93,6 +94,7 @@ def test_load_says_what_is_ready(tmp_path: Path) -> None:
     assert task.wait(60) and task.result == "loaded: 10000 samples, 1 ms each; no machine is needed"
 
 
+@pytest.mark.usefixtures("nothing_drawn")
 def test_a_result_is_saved_where_one_wants_it_and_replaces_nothing(tmp_path: Path) -> None:
     equipment = Equipment(Session(tmp_path), "model")
     equipment.choices.set("duration", 0.1)
@@ -109,6 +111,7 @@ def test_a_result_is_saved_where_one_wants_it_and_replaces_nothing(tmp_path: Pat
 
 
 @pytest.mark.realtime
+@pytest.mark.usefixtures("nothing_drawn")
 def test_a_gain_is_changed_while_it_runs_and_recorded_with_its_time(alone: Path) -> None:
     session = Session(alone)
     equipment = Equipment(session, "control")
@@ -140,6 +143,7 @@ def test_a_gain_is_changed_while_it_runs_and_recorded_with_its_time(alone: Path)
 
 
 @pytest.mark.realtime
+@pytest.mark.usefixtures("nothing_drawn")
 def test_a_run_that_is_stopped_at_once_gives_the_machine_back(alone: Path) -> None:
     session = Session(alone)
     equipment = Equipment(session, "model")
@@ -151,6 +155,7 @@ def test_a_run_that_is_stopped_at_once_gives_the_machine_back(alone: Path) -> No
 
 
 @pytest.mark.realtime
+@pytest.mark.usefixtures("nothing_drawn")
 def test_a_folder_that_is_taken_away_during_a_run_is_said_so(alone: Path) -> None:
     session = Session(alone)
     equipment = Equipment(session, "control")

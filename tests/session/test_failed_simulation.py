@@ -40,6 +40,7 @@ def test_the_samples_up_to_the_fault_are_saved_and_marked(tmp_path: Path) -> Non
         experiment.run()
 
 
+@pytest.mark.usefixtures("nothing_drawn")
 def test_a_panel_shows_the_run_up_to_its_fault(tmp_path: Path) -> None:
     (tmp_path / "late.py").write_text(LATE.replace("0.25", "0.4"))
     equipment = Equipment(Session(tmp_path), "control")

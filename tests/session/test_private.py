@@ -17,6 +17,7 @@ import pytest
 from lost_machines import unless_lost
 from other_user import SIGN, hall, open_by_mode, seen_by_another
 from typer.main import get_command
+from typer.testing import CliRunner
 
 import rds
 from rds.bus.tools.logs import ENDINGS, LogWriter
@@ -121,18 +122,10 @@ def test_the_command_line(alone: Path, how: str, umask: int) -> None:
     with hall(umask) as place:
         (place / "experiment.toml").write_text(TOML)
         (place / "experiment.toml").chmod(0o644)
-        words = [
-            sys.executable,
-            "-m",
-            "rds",
-            "run",
-            str(place / "experiment.toml"),
-            "--out",
-            str(place / "new" / "run"),
-        ]
+        words = ["run", str(place / "experiment.toml"), "--out", str(place / "new" / "run")]
         words += ["--shared"] if how == "option" else []
-        environment = os.environ | {SHARED: "1" if how == "environment" else ""}
-        subprocess.run(words, check=True, capture_output=True, env=environment)
+        done = CliRunner().invoke(app, words, env={SHARED: "1" if how == "environment" else ""})
+        assert done.exit_code == 0, done.stderr
         made = [place / "new", *(place / "new").rglob("*")]
         modes = {(path.is_dir(), stat.S_IMODE(path.stat().st_mode)) for path in made}
         assert modes == ({(True, 0o700), (False, 0o600)} if how == "private" else {(True, 0o750), (False, 0o640)})

@@ -164,6 +164,7 @@ def test_the_diagram_names_the_path_and_all_axes(tmp_path: Path) -> None:
 
 
 @pytest.mark.realtime
+@pytest.mark.usefixtures("nothing_drawn")
 def test_it_is_held_and_tuned_while_it_runs(tmp_path: Path) -> None:
     equipment = coupled(tmp_path, shape="circle", mode="emulation", sample_period=0.005)
     run = equipment.run().start()

@@ -15,8 +15,8 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
-from operator import itemgetter, mul
+from itertools import islice, pairwise
+from operator import mul
 
 import numpy as np
 
@@ -188,29 +188,43 @@ class _Answer:
 
     def best(self, part: slice, parts: int) -> LinearLoop | NoLoop | None:
         """The loop of the law that fits this part; NoLoop where that is surely unstable; None where none fits."""
-        found: list[tuple[float, LinearLoop | NoLoop]] = []
+        found: list[LawFit] = []
         for fit in law_fits(self.voltage, self.position, part):
             if fit.departure > MOST or departure(fit, self.voltage, self.position, part, parts) > MOST_IN_A_PART:
                 continue
-            loop = closed(fit, self.model, self.T)
             if fit.is_exact:
-                return loop
-            found.append((fit.departure, loop))
-        stable = [each for each in found if isinstance(each[1], LinearLoop)]
-        if stable:
-            least = min(share for share, _ in stable)
-            return next(loop for share, loop in stable if share <= _SIMPLER * least)
+                return closed(fit, self.model, self.T)
+            found.append(fit)
+        loops: dict[int, LinearLoop | NoLoop] = {}  # by place in `found`: only those that are looked at are computed
+        nearest_first = sorted(range(len(found)), key=lambda place: found[place].departure)
+        for nearest in nearest_first:
+            loops[nearest] = closed(found[nearest], self.model, self.T)
+            if isinstance(loops[nearest], NoLoop):
+                continue
+            for place, fit in enumerate(found[:nearest]):
+                if fit.departure > _SIMPLER * found[nearest].departure:
+                    continue
+                loop = loops[place] if place in loops else closed(fit, self.model, self.T)
+                if isinstance(loop, LinearLoop):
+                    return loop
+            return loops[nearest]
         if not found:
             return None
-        share, unstable = min(found, key=itemgetter(0))
+        share, unstable = found[nearest_first[0]].departure, loops[nearest_first[0]]
         return unstable if share <= _SURELY or _runs_away(self.command[part], self.limit) else None
 
 
 def closed(fit: LawFit, model: Model, T: float) -> LinearLoop | NoLoop:
     """The answer of a linear law on a linear axis to a pulse, until it has died down."""
     samples = _SHORT
+    answers = _answers(fit, model, T)
+    voltages: list[float] = []
+    positions: list[float] = []
     while True:
-        loop = LinearLoop(*_answers(fit, model, T, samples), T)
+        for voltage, position in islice(answers, samples - len(positions)):
+            voltages.append(voltage)
+            positions.append(position)
+        loop = LinearLoop(np.array(voltages), np.array(positions), T)
         if len(loop.position) < samples:  # of a loop that grows fast there may be a few only
             return NoLoop(_GROWS, True)
         size = np.abs(loop.position).max()
@@ -226,19 +240,19 @@ def closed(fit: LawFit, model: Model, T: float) -> LinearLoop | NoLoop:
         samples *= 4
 
 
-def _answers(fit: LawFit, model: Model, T: float, samples: int) -> tuple[np.ndarray, np.ndarray]:
+def _answers(fit: LawFit, model: Model, T: float) -> Iterator[tuple[float, float]]:
+    """Voltage and position at each sample, as long as the axis comes back."""
     motion = start(model, T)
     a, b = fit.a[1:].tolist(), fit.b.tolist()
     last_u, last_y = deque([0.0] * len(a), len(a)), deque([0.0] * len(b), len(b))  # the latest first
-    voltages, positions = [], []
-    for k in range(samples):
+    pulse = PULSE
+    while True:
         y = motion.read()
         last_y.appendleft(y)
         u = sum(map(mul, b, last_y)) - sum(map(mul, a, last_u))
         last_u.appendleft(u)
         if not abs(y) < _FAR:
-            break
-        voltages.append(u)
-        positions.append(y)
-        motion.write(u + PULSE if k == 0 else u)
-    return np.array(voltages), np.array(positions)
+            return
+        yield u, y
+        motion.write(u + pulse)
+        pulse = 0.0
