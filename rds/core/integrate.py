@@ -26,8 +26,8 @@ def rk4(
 ) -> list[float]:
     """The state `T` s after `x` at time `t`, with `u` constant: `substeps` steps of the classical Runge-Kutta method.
 
-    `derivatives(t, x, u, params)` gets the state as numbers, and returns as many, in a sequence of its own. Over a given
-    time the error falls with the fourth power of the step.
+    `derivatives(t, x, u, params)` gets the state as numbers, and returns as many, in a sequence of its own. Over a
+    given time the error falls with the fourth power of the step.
     """
     h, x, each = T / substeps, list(x), range(len(x))  # numbers: numpy takes twice as long for a few states
     half, sixth = 0.5 * h, h / 6.0

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import floats, integers, lists, sampled_from, tuples
+from small_machines import machine
 from typer.testing import CliRunner
 
 import rds
@@ -334,11 +335,11 @@ def test_words_of_an_interpolator_without_one_are_refused(here: Path, words: lis
 
 
 def test_the_command_runs_a_student_s_interpolator(here: Path) -> None:
-    (here / "straight.ngc").write_text("G21 G90 F600\nG1 X3\nG1 Y2\nM2\n")
-    words = ["nc", "run", "straight.ngc", "--interpolator", "mine.py", "--out", "out", "--json"]
-    ran = CliRunner().invoke(app, words)
+    (here / "straight.ngc").write_text("G21 G90 F600\nG1 X3\nG1 X1\nM2\n")
+    words = ["nc", "run", "straight.ngc", "--machine", str(machine(here, "X")), "--out", "out", "--json"]
+    ran = CliRunner().invoke(app, [*words, "--interpolator", "mine.py", "--arc-interpolator", "circular"])
     assert ran.exit_code == 0, ran.output
-    assert '"interpolator": "mine.py"' in ran.stdout and '"path_error"' in ran.stdout
+    assert '"interpolator": "mine.py, arcs by circular"' in ran.stdout and '"path_error"' in ran.stdout
     assert (here / "out" / "program.html").is_file()
 
 
