@@ -212,7 +212,7 @@ def test_home_leads_back(here: Path) -> None:
     ),
     feed=floats(2.0, 20.0),
 )
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_whatever_is_wanted_the_rate_changes_gently(changes: list[tuple[int, Any]], feed: float) -> None:
     """No step between rows is longer than the feed allows, none goes back, and the end is the path's."""
     machine = load_machine("mini-cnc")
