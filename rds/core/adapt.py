@@ -244,7 +244,7 @@ def _nonlinear_advance(
 def _moved(
     sys: Any, t: float, x: np.ndarray, u: np.ndarray, T: float, params: Any, continuous: bool
 ) -> tuple[float, ...]:
-    def update(t: float, x: Sequence[float], u: np.ndarray, params: Any) -> list[float]:
+    def update(t: float, x: Any, u: np.ndarray, params: Any) -> list[float]:
         answer: list[float] = np.asarray(sys.dynamics(t, np.array(x), u, params=params), dtype=float).ravel().tolist()
         return answer
 
