@@ -46,7 +46,13 @@ class Row:
 
 def rows(number: int, kinds: Sequence[str] = ()) -> list[Row]:
     """The verdicts on the models of one machine; of these `kinds` only, if any are given."""
-    return [_row(case) for case in cases(number) if not kinds or case.kind in kinds]
+    found: list[Row] = []
+    for case in cases(number):
+        if not kinds or case.kind in kinds:
+            found.append(_row(case))
+            if len(found) == len(kinds):  # there is one of each; those to come are fitted first
+                break
+    return found
 
 
 def _row(case: Case) -> Row:

@@ -191,18 +191,18 @@ class _Check:
         """What the function says, if it says it properly: a fault is noted otherwise."""
         arguments = self._arguments(t, x.copy(), u)
         before = copy.deepcopy(arguments)
-        situation = f"with x = {shown(x.tolist())} and {u:g} V"
         started = time.perf_counter_ns()
         try:
             answer = self.function(*arguments, params)
         except STUDENT_ERRORS as error:
+            situation = _situation(x, u)
             self.found.fault(clauses.RUNS, f"{self.role}() failed {situation}: {student_error(error, self.source)}")
             return None
         self.ns.append(time.perf_counter_ns() - started)
         if fault := vector_fault(answer, len(self.x0)):
-            self.found.fault(fault[0], f"{self.role}() returned {fault[1]} {situation}; {fault[2]}")
+            self.found.fault(fault[0], f"{self.role}() returned {fault[1]} {_situation(x, u)}; {fault[2]}")
             return None
-        if not same(before, arguments):
+        if not same(before, arguments) and all(fault.clause != clauses.UNCHANGED for fault in self.found.faults):
             said = f"{self.role}() changed its arguments from {shown(before)} to {shown(arguments)}"
             self.found.fault(clauses.UNCHANGED, f"{said}; work on a copy, `x.copy()`")
         if not same(self.params, params):
@@ -272,6 +272,10 @@ class _Check:
             remedy = "use T in it, or keep to the sample period that it was made for"
             self.found.warn(clauses.SAMPLE_TIME, f"{said}; {remedy}")
         return None
+
+
+def _situation(x: np.ndarray, u: float) -> str:
+    return f"with x = {shown(x.tolist())} and {u:g} V"
 
 
 def _count(states: int) -> str:

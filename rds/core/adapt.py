@@ -244,13 +244,13 @@ def _nonlinear_advance(
 def _moved(
     sys: Any, t: float, x: np.ndarray, u: np.ndarray, T: float, params: Any, continuous: bool
 ) -> tuple[float, ...]:
-    def update(t: float, x: np.ndarray, u: np.ndarray, params: Any) -> np.ndarray:
-        return np.asarray(sys.dynamics(t, x, u, params=params), dtype=float).ravel()
+    def update(t: float, x: Any, u: np.ndarray, params: Any) -> list[float]:
+        answer: list[float] = np.asarray(sys.dynamics(t, np.array(x), u, params=params), dtype=float).ravel().tolist()
+        return answer
 
     if x.size == 0:
         return ()
-    answer = rk4(update, t, x, u, T, params) if continuous else update(t, x, u, params)
-    return tuple(answer.tolist())
+    return tuple(rk4(update, t, x.tolist(), u, T, params) if continuous else update(t, x, u, params))
 
 
 def _nonlinear_output(

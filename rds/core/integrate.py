@@ -6,7 +6,7 @@ err the same in every sample, so that a run repeats to the bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import ceil, log2
 from typing import Any
 
@@ -16,27 +16,28 @@ SUBSTEPS = 10  # steps in each sample, where nothing else is asked for
 
 
 def rk4(
-    derivatives: Callable[..., np.ndarray],
+    derivatives: Callable[..., Sequence[float]],
     t: float,
-    x: np.ndarray,
-    u: np.ndarray,
+    x: Sequence[float],
+    u: Any,
     T: float,
     params: Any,
     substeps: int = SUBSTEPS,
-) -> np.ndarray:
+) -> list[float]:
     """The state `T` s after `x` at time `t`, with `u` constant: `substeps` steps of the classical Runge-Kutta method.
 
-    `derivatives(t, x, u, params)` returns an array of the size of `x`. Over a given time the error falls with the
-    fourth power of the step.
+    `derivatives(t, x, u, params)` gets the state as numbers, and returns as many, in a sequence of its own. Over a
+    given time the error falls with the fourth power of the step.
     """
-    h = T / substeps
+    h, x, each = T / substeps, list(x), range(len(x))  # numbers: numpy takes twice as long for a few states
+    half, sixth = 0.5 * h, h / 6.0
     for i in range(substeps):
         now = t + i * h
         k1 = derivatives(now, x, u, params)
-        k2 = derivatives(now + 0.5 * h, x + 0.5 * h * k1, u, params)
-        k3 = derivatives(now + 0.5 * h, x + 0.5 * h * k2, u, params)
-        k4 = derivatives(now + h, x + h * k3, u, params)
-        x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+        k2 = derivatives(now + half, [x[n] + half * k1[n] for n in each], u, params)
+        k3 = derivatives(now + half, [x[n] + half * k2[n] for n in each], u, params)
+        k4 = derivatives(now + h, [x[n] + h * k3[n] for n in each], u, params)
+        x = [x[n] + sixth * (k1[n] + 2.0 * (k2[n] + k3[n]) + k4[n]) for n in each]
     return x
 
 

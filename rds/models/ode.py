@@ -22,6 +22,8 @@ from rds.core.values import shown
 
 Function = Callable[..., Any]
 
+_FLOATS = frozenset({float, np.float64})
+
 
 def ode_model(
     derivatives: Function,
@@ -99,16 +101,20 @@ def _advance_by_rk4(
     t: float = 0.0,
     where: str | None = None,
 ) -> tuple[float, ...]:
-    state = np.array(x, dtype=float)
-    checked = partial(_checked, derivatives, state.size, where)
-    return tuple(rk4(checked, t, state, _voltage(u), T, params, substeps).tolist())
+    slopes = partial(_slopes, derivatives, len(x), where)
+    return tuple(rk4(slopes, t, list(map(float, x)), _voltage(u), T, params, substeps))
 
 
-def _checked(
-    derivatives: Function, size: int, where: str | None, t: float, x: np.ndarray, u: np.ndarray, params: Any
-) -> np.ndarray:
-    # of its own: a function that works in its x would change the state that the step goes on from
-    return _vector(derivatives(t, x.copy(), u, params), size, "derivatives", "dx/dt", where)
+def _slopes(
+    derivatives: Function, size: int, where: str | None, t: float, x: list[float], u: np.ndarray, params: Any
+) -> list[float]:
+    """dx/dt as numbers of its own: a function may give the same array, or list, each time that it is asked."""
+    answer = derivatives(t, np.array(x), u, params)
+    kind = type(answer)
+    numbers = answer.tolist() if kind is np.ndarray else answer if kind is list or kind is tuple else ()
+    if len(numbers) == size and _FLOATS.issuperset(map(type, numbers)):
+        return list(map(float, numbers))
+    return _vector(answer, size, "derivatives", "dx/dt", where).tolist()
 
 
 def _advance_by_student(

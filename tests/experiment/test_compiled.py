@@ -6,13 +6,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import booleans, floats, sampled_from
 
 import rds
 from rds.core.extras import remedy
+from rds.modes.experiment.compiled import obstacle, run_compiled
 from rds.modes.experiment.outcome import bus_note
+from rds.modes.process.host import run_plan
 
 numba = pytest.importorskip("numba")
 
@@ -48,6 +51,16 @@ def test_the_same_to_the_bit(controller: dict[str, Any], interface: bool) -> Non
             "interface": {"saturation": interface, "quantization": interface},
         }
     )
+
+
+@pytest.mark.parametrize("name", ["tracking", "pid", "modified-pid", "cascade"])
+def test_signals_are_those_of_the_loop_to_the_last_bit(name: str) -> None:
+    """Here, where their loops are compiled already."""
+    plan = rds.Experiment(duration=0.5, controller={"name": name}, reference=REFERENCES[0]).plan("simulation")
+    assert obstacle(plan) is None and plan.axes[0].controller is not None and plan.axes[0].controller.signals
+    ours, loops = run_compiled(plan), run_plan(plan, None)
+    assert ours is not None and ours.columns == loops.columns and ours.units == loops.units
+    assert np.array_equal(ours.values, loops.values)
 
 
 @settings(max_examples=25, deadline=None)

@@ -166,7 +166,7 @@ def test_errors_are_told_in_the_axis_s_unit() -> None:
 def test_it_learns_on_the_machine() -> None:
     quick = {"kind": "sinusoid", "amplitude": 2.5, "frequency": 0.8}  # as fast, in half the time
     words = {"model": None, "sample_period": 0.002, "duration": 1.25, "reference": quick}
-    learned = learn(experiment(**words), 3, mode="implementation")
+    learned = learn(experiment(**words), 2, mode="implementation")
     assert learned.rms["X"][-1] < 0.7 * learned.rms["X"][0]
 
 

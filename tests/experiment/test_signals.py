@@ -13,8 +13,7 @@ from rds.controllers import library_controller
 from rds.core.errors import ContractError
 from rds.models import library_model
 from rds.modes.experiment import Experiment
-from rds.modes.experiment.compiled import obstacle, run_compiled
-from rds.modes.process.host import run_plan
+from rds.modes.experiment.compiled import obstacle
 from rds.results import Result, open_result
 from rds.results.plots_signals import signals as draw
 from rds.results.signals import estimate_error, signals_of
@@ -120,16 +119,6 @@ def test_a_spindle_and_a_model_with_an_output_of_its_own_have_no_plant_velocity(
     assert "spindle_plant_velocity" not in spindle.run("simulation")
     own = {"derivatives": lambda t, x, u, params: [-x[0], x[0]], "output": lambda t, x, u, params: x[1]}
     assert "X_plant_velocity" not in experiment({"name": "pid"}, model=own).run("simulation")
-
-
-@pytest.mark.parametrize("name", ["tracking", "pid", "modified-pid", "cascade"])
-def test_compiled_signals_are_those_of_the_loop_to_the_last_bit(name):
-    pytest.importorskip("numba")
-    plan = experiment({"name": name}, duration=0.5).plan("simulation")
-    assert obstacle(plan) is None
-    ours, loops = run_compiled(plan), run_plan(plan, None)
-    assert ours.columns == loops.columns and ours.units == loops.units
-    assert np.array_equal(ours.values, loops.values)
 
 
 def test_a_file_with_signals_is_not_compiled(file):

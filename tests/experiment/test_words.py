@@ -402,7 +402,7 @@ PLAUSIBLE = fixed_dictionaries(
 )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(table=one_of(dictionaries(KEYS, JUNK), PLAUSIBLE))
 def test_junk_is_refused_or_planned_and_nothing_else(table: dict[str, Any]) -> None:
     table = _without_none(table)

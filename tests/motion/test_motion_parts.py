@@ -100,7 +100,7 @@ def test_an_arc_that_ends_beside_its_start_is_a_full_circle_however_it_is_rounde
         assert row["length"] == pytest.approx(14 * pi)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     table=st.lists(
         st.tuples(st.floats(1e-4, 5.0), st.floats(0.05, 20.0), st.floats(1.0, 200.0)), min_size=1, max_size=12

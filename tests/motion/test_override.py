@@ -53,7 +53,7 @@ def shares(position: np.ndarray) -> list[float]:
     ]
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
 @given(
     segments=chains(most=6, low=-1.0),
     wanted=st.lists(st.sampled_from((0.0, 0.1, 0.5, 1.0, 1.5, 2.0)), min_size=1, max_size=6),

@@ -28,7 +28,7 @@ def periods(segments: np.ndarray, limits: Limits) -> float:
     return 1e-3 if (segments["length"] / slowest).sum() < 30.0 else 1e-2
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 @given(segments=chains(), limits=st.sampled_from(MACHINES))
 def test_every_sample_keeps_every_limit(segments: np.ndarray, limits: Limits) -> None:
     if not len(segments):

@@ -140,7 +140,7 @@ def test_blended_motion_refuses_what_cannot_be() -> None:
 ends = st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(-20, 20))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=35, deadline=None)
 @given(end=ends)
 def test_our_moves_take_as_long_as_the_fastest_there_are(end: tuple[float, ...]) -> None:
     """ruckig's moves are the fastest within the same limits: ours take at most a few ms and 1 % more, never less."""

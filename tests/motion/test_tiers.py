@@ -29,7 +29,7 @@ from .chains import MACHINES, chains
 
 pytest.importorskip("numba", reason="numba is not installed: it is in the extra fast")
 
-T = 4e-3  # s: the longest motion below has 40,000 samples so, each of which Python computes
+T = 20e-3  # s: the longest motion below has 8,000 samples so, each of which Python computes
 LIMITS = MACHINES[0]
 
 

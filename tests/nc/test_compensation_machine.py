@@ -35,7 +35,7 @@ STRICTER = ("only backward", "stopped at this inside corner", "too short for the
 
 
 @needs_rs274
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=35, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(cases())
 def test_every_stretch_is_made_or_refused_as_linuxcnc_does(case: Case) -> None:
     printed, complaint = rs274(program(case))

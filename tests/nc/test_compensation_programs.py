@@ -52,7 +52,7 @@ STRICTER = ("only backward", "stopped at this inside corner", "too short for the
 
 
 @needs_rs274
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(cases())
 def test_random_programs_give_the_same_calls_or_are_refused(case: Case) -> None:
     source = program(case)

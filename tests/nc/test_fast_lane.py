@@ -248,7 +248,7 @@ programs = st.builds(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     programs, st.sampled_from([Dialect(max_jumps=50), Dialect(True, True, max_jumps=50), Dialect(program_numbers=True)])
 )
@@ -262,7 +262,7 @@ def test_cycles_and_comments() -> None:
         same(plain_program(Random(seed)))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(programs, st.data())
 def test_mutated_bytes(program: bytes, data: st.DataObject) -> None:
     mutant = bytearray(program + b"M2\n")
@@ -296,7 +296,7 @@ def test_numbers_are_those_of_float(seed: int) -> None:
     assert [repr(float(value)) for value in values] == [repr(float(number)) for number in spelled]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     st.lists(
         st.tuples(*(st.floats(-200, 200).map(lambda value: f"{value:.4f}") for _ in range(2)), st.floats(0.5, 3)),

@@ -29,7 +29,7 @@ def test_the_expected_calls_are_those_of_the_rs274_installed_here(path: Path) ->
 
 
 @needs_rs274
-@settings(max_examples=60, suppress_health_check=list(HealthCheck))
+@settings(max_examples=30, suppress_health_check=list(HealthCheck))
 @given(st.randoms(use_true_random=False))
 def test_random_programs_become_the_same_calls_up_to_the_same_fault(r: Random) -> None:
     text = program(r)

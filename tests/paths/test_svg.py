@@ -95,8 +95,9 @@ def test_clones_are_drawn_where_they_are_put(drawn: Read, href: str) -> None:
 
 def test_clones_that_multiply_without_end_are_refused(drawn: Read) -> None:
     groups = "".join(f'<g id="g{k}">' + f'<use href="#g{k + 1}"/>' * 20 + "</g>" for k in range(8))
+    many = " ".join(f"{k},{k % 7}" for k in range(1000))
     with pytest.raises(InputError, match="more than 2000000 points, clones included"):
-        drawn(f'<defs>{groups}<g id="g8">{BOX}</g></defs><use href="#g0"/>')
+        drawn(f'<defs>{groups}<g id="g8"><polyline points="{many}"/></g></defs><use href="#g0"/>')
 
 
 def test_a_clone_of_itself_ends(drawn: Read) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rds.interpolators.motion.segments import XY, YZ, ZX, arc, chain, in_plane, line, point_at
+from rds.interpolators.motion.segments import XY, YZ, ZX, arc, chain, in_plane, line, point_at, points_at
 from rds.nc.run.contour import contour_error
 
 DENSE = 1500
@@ -35,7 +35,8 @@ def arcs(draw: st.DrawFn) -> np.ndarray:
 
 def brute(points: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, float]:
     """Distance to the nearest of many points of the path, and how far it may be too large."""
-    dense = np.array([point_at(row, d)[:3] for row in path for d in np.linspace(0.0, row["length"], DENSE)])
+    share = np.tile(np.linspace(0.0, 1.0, DENSE), len(path))
+    dense = points_at(np.repeat(path, DENSE), share)[:, :3]
     distance = np.array([np.linalg.norm(dense - p, axis=1).min() for p in points])
     return distance, float(path["length"].max()) / DENSE
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import floats, integers, lists, sampled_from, tuples
+from small_machines import machine
 from typer.testing import CliRunner
 
 import rds
@@ -211,7 +212,7 @@ def test_home_leads_back(here: Path) -> None:
     ),
     feed=floats(2.0, 20.0),
 )
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_whatever_is_wanted_the_rate_changes_gently(changes: list[tuple[int, Any]], feed: float) -> None:
     """No step between rows is longer than the feed allows, none goes back, and the end is the path's."""
     machine = load_machine("mini-cnc")
@@ -334,11 +335,11 @@ def test_words_of_an_interpolator_without_one_are_refused(here: Path, words: lis
 
 
 def test_the_command_runs_a_student_s_interpolator(here: Path) -> None:
-    (here / "straight.ngc").write_text("G21 G90 F600\nG1 X3\nG1 Y2\nM2\n")
-    words = ["nc", "run", "straight.ngc", "--interpolator", "mine.py", "--out", "out", "--json"]
-    ran = CliRunner().invoke(app, words)
+    (here / "straight.ngc").write_text("G21 G90 F600\nG1 X3\nG1 X1\nM2\n")
+    words = ["nc", "run", "straight.ngc", "--machine", str(machine(here, "X")), "--out", "out", "--json"]
+    ran = CliRunner().invoke(app, [*words, "--interpolator", "mine.py", "--arc-interpolator", "circular"])
     assert ran.exit_code == 0, ran.output
-    assert '"interpolator": "mine.py"' in ran.stdout and '"path_error"' in ran.stdout
+    assert '"interpolator": "mine.py, arcs by circular"' in ran.stdout and '"path_error"' in ran.stdout
     assert (here / "out" / "program.html").is_file()
 
 

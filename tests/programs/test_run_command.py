@@ -19,6 +19,7 @@ import pytest
 from documents import blocks
 from typer.testing import CliRunner
 
+import rds
 from rds.cli.keys import Keys
 from rds.cli.main import app
 from rds.cli.nc_operate import press
@@ -41,6 +42,12 @@ def test_the_commands_of_the_document_work(command: list[str], part: Path, monke
     assert done.exit_code == 0, done.output
     folder = Path("fast") if "--out" in command else next(Path("runs").iterdir())
     assert {"program.html", "report.html", "result.csv", "program-path.png"} <= {path.name for path in folder.iterdir()}
+    page, about = (folder / "program.html").read_text(), rds.open_result(folder).meta["program"]
+    worst = about["contour_error"]
+    assert f"{worst['max']:.4f} mm off the programmed path, in line {worst['line']}" in page
+    assert part.read_text().splitlines()[worst["line"] - 1] in page
+    assert "data:image/png;base64" in page and 'href="./report.html"' in page
+    assert 'href="./program.html"' in (folder / "report.html").read_text()
     if "--json" not in command:
         assert "off the programmed path, in line" in done.stdout
         return
@@ -97,17 +104,18 @@ def test_a_folder_that_cannot_be_is_told_before_anything_runs(
     assert not started
 
 
-def test_what_is_replaced_is_told(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(part.parent)
+def test_what_is_replaced_is_told(one_axis: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(Path(one_axis[0]).parent)
     earlier = [Path("out") / name for name in ("changes.csv", "program-changed-while-it-ran.csv")]
     Path("out").mkdir()
     for file in (*earlier, Path("out/result.csv"), Path("out/program.txt")):
         file.write_text("time [s],X_measured [mm]\n")
-    done = CliRunner().invoke(app, ["nc", "run", "part.ngc", "--out", "out"])
+    done = CliRunner().invoke(app, ["nc", "run", *one_axis, "--out", "out"])
     assert done.exit_code == 0, done.output
     assert "out: replaces the results of an earlier run there" in done.stderr
     assert not any(file.exists() for file in earlier)
     assert Path("out/program.txt").exists()  # none of ours
+    assert Path("out/program-path.png").stat().st_size > 5000  # of one axis, too
 
 
 class Running:
@@ -161,10 +169,10 @@ def test_keys_come_one_by_one() -> None:
 
 
 @pytest.mark.realtime
-def test_a_terminal_operates_the_run(slow_part: Path, alone: Path) -> None:
+def test_a_terminal_operates_the_run(one_axis: list[str], alone: Path) -> None:
     """In a real terminal: faster, hold, on, and home from the stop."""
     ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "rds.cli.main", "nc", "run", str(slow_part), "--mode", "emulation", "--out", "run"]
+    command = [sys.executable, "-m", "rds.cli.main", "nc", "run", *one_axis, "--mode", "emulation", "--out", "run"]
     host = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, close_fds=True)
     os.close(theirs)
     screen = b""

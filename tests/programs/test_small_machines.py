@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_machines import machine
 from typer.testing import CliRunner
 
 from rds import Experiment
@@ -19,23 +20,6 @@ from rds.nc.run.pictures import along, path
 from rds.nc.run.run import PartProgram
 from rds.nc.setup import Setup
 
-AXIS = """
-[axis.{name}]
-node = {node}
-unit = "{unit}"
-travel = [-400.0, 400.0]
-resolution = 0.001
-[axis.{name}.model]
-name = "linear-axis"
-tau = 0.01
-K = {gain}
-[axis.{name}.limits]
-velocity = {velocity}
-acceleration = {acceleration}
-jerk = {jerk}
-"""
-LINEAR = {"unit": "mm", "gain": 1.8, "velocity": 13.0, "acceleration": 200.0, "jerk": 10000.0}
-ROTARY = {"unit": "deg", "gain": 10.0, "velocity": 60.0, "acceleration": 600.0, "jerk": 30000.0}
 PROGRAMS = {
     "X": "G21 G90 G61 F600\nG0 X4\nG1 X6\nX2\nM2\n",
     "XC": "G21 G90 G61 F600\nG0 X4\nG1 X6 C10\nC40 F3000\nG0 X0 C0\nM2\n",
@@ -43,15 +27,6 @@ PROGRAMS = {
 }
 P001 = "P001;\nN10 G01 X0 Y0;\nN20 G01 X100 A25 F100 S1000;\nN30 M00;\nN40 M02;\n"
 TABLE_5_2 = "O001  \nN010 G21 G40 G91  \nN020 G0 X70 Y20  \nN030 X-70 Y-20  \nN040 M5\n"
-
-
-def machine(folder: Path, axes: str) -> Path:
-    tables = [
-        AXIS.format(name=name, node=node, **(LINEAR if name in "XYZ" else ROTARY)) for node, name in enumerate(axes, 2)
-    ]
-    file = folder / f"{axes}.toml"
-    file.write_text("sample_period = 0.001\n" + "".join(tables))
-    return file
 
 
 def written(folder: Path, text: str) -> Path:
@@ -81,12 +56,8 @@ def test_axes_that_no_side_shows_are_drawn_over_time(axes: str, tmp_path: Path) 
     assert drawn == pytest.approx([fastest[name] for name in axes], rel=0.2)
 
 
-def test_the_commands_draw_and_run_one_axis(tmp_path: Path) -> None:
+def test_the_plot_command_draws_one_axis(tmp_path: Path) -> None:
     part, one = written(tmp_path, PROGRAMS["X"]), machine(tmp_path, "X")
-    out = tmp_path / "out"
-    done = CliRunner().invoke(app, ["nc", "run", str(part), "--machine", str(one), "--out", str(out)])
-    assert done.exit_code == 0, done.output
-    assert (out / "program-path.png").stat().st_size > 5000
     assert CliRunner().invoke(app, ["nc", "plot", str(part), "--machine", str(one)]).exit_code == 0
     assert (tmp_path / "part-path.png").stat().st_size > 5000
 

@@ -48,11 +48,11 @@ def experiment(tmp_path: Path, values: dict[str, float] = X, options: Any = (), 
 def test_a_draw_is_the_ordinary_simulation(
     tmp_path: Path, values: dict[str, float], options: Any, controller: Any
 ) -> None:
-    nominal = experiment(tmp_path, values, options, controller=controller)
+    nominal = experiment(tmp_path, values, options, controller=controller, duration=0.8)
     found = study(nominal, 12, seed=5)
     controller = nominal.plan().axes[0].controller
     for draw in (0, 7):
-        again = experiment(tmp_path, controller=controller, model=found.model(draw)).run()
+        again = experiment(tmp_path, controller=controller, model=found.model(draw), duration=0.8).run()
         assert again.metrics["X"]["max_abs_error"] == found.figure(0, "max_error")[draw]
         assert again.metrics["X"]["rms_error"] == pytest.approx(found.figure(0, "rms_error")[draw], rel=1e-12)
         assert np.abs(again["X_command"]).max() == found.figure(0, "peak_voltage")[draw]

@@ -101,7 +101,7 @@ def test_a_copy_of_the_fit_s_data_in_another_format_is_known(tmp_path: Path) -> 
 
 
 def test_a_student_s_file_and_others_against_it(tmp_path: Path) -> None:
-    data = saved(tmp_path, "data", square(4.0))
+    data = saved(tmp_path, "data", square(2.0))
     (tmp_path / "mine.py").write_text(STUDENT)
     answer = rds(tmp_path / "mine.py", data, "--against", model_file(tmp_path / "m.toml"), "--json")
     assert json.loads(answer.stdout)["verdict"] == "not valid" and answer.exit_code == 1
