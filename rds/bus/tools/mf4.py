@@ -12,8 +12,6 @@ import contextlib
 import importlib
 import sys
 from collections.abc import Sequence
-from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec
 from pathlib import Path
 from traceback import walk_tb
 from types import ModuleType
@@ -25,12 +23,13 @@ from rds.core.extras import missing
 _WHAT, _WHILE = "asammdf", "can"
 
 
-class _NotYet(MetaPathFinder):
-    """Python's import system does not find asammdf while python-can is being imported."""
+class _NotYet:
+    """Python's import system does not find asammdf while python-can is being imported.
 
-    def find_spec(
-        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
+    No importlib.abc.MetaPathFinder, which takes as long to import as Python takes to start.
+    """
+
+    def find_spec(self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> None:
         importing = getattr(getattr(sys.modules.get(_WHILE), "__spec__", None), "_initializing", False)
         if name == _WHAT and importing:
             raise ModuleNotFoundError(f"{_WHAT} is imported when an MF4 file is read or written", name=_WHAT)
