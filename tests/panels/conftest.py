@@ -75,12 +75,17 @@ def start_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[...
         raise AssertionError("rds app did not start:\n" + log.read_text())
 
     yield start
-    going = [app.process for app in started if app.process.poll() is None]
-    for process in going:  # they end beside each other
+    end(*started)
+    shutil.rmtree(runtime, ignore_errors=True)
+
+
+def end(*apps: App) -> None:
+    """End them beside each other."""
+    going = [app.process for app in apps if app.process.poll() is None]
+    for process in going:
         os.killpg(process.pid, signal.SIGTERM)
     for process in going:
         process.wait(20)
-    shutil.rmtree(runtime, ignore_errors=True)
 
 
 @pytest.fixture(scope="package")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
-from tests.panels.conftest import App
+from tests.panels.conftest import App, end
 
 DIALECT = '.rds-field:has(.rds-label:has-text("Dialect")) select'
 
@@ -24,9 +24,11 @@ def tab(page: Any, title: str) -> None:
 
 
 @pytest.fixture
-def own_app(start_app: Callable[..., App]) -> App:
+def own_app(start_app: Callable[..., App]) -> Iterator[App]:
     """An app for itself: what it serves is on its bus."""
-    return start_app(None, "--machine", "mrmt-oacs")
+    app = start_app(None, "--machine", "mrmt-oacs")
+    yield app
+    end(app)  # its kernel would go on listening to the bus
 
 
 def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_page: Callable[..., Any]) -> None:
