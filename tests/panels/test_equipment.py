@@ -90,7 +90,8 @@ class Equipment:
         """Wait until the files of the run are written, not of one that was shown before it; their folder."""
         self.page.wait_for_function(
             """(before) => [...document.querySelectorAll('code')].some(
-                (each) => each.parentElement.innerText.startsWith('Saved with') && each.innerText !== before)""",
+                (each) => each.offsetParent && each.parentElement.innerText.startsWith('Saved with')
+                    && each.innerText !== before)""",
             arg=self._before,
         )
         return Path(self._saved_in())
