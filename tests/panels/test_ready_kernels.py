@@ -210,7 +210,7 @@ def test_kernels_end_with_the_server_though_compiled_code_holds_one_and_are_star
         idle.kill()
 
 
-MANY = 20_000  # a panel that is opened is up to 948; ZeroMQ keeps 2,000 of its own, and a socket some more
+MANY = 20_000  # a panel that is opened is up to 272; ZeroMQ keeps 2,000 of its own, and a socket some more
 PANEL_OPENS = f"""
 kernel = get_ipython().kernel
 for number in range({MANY}):
