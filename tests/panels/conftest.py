@@ -23,8 +23,8 @@ HOW = "no Chromium here: install it (Debian: apt-get install chromium) to run th
 PATIENCE = 60_000  # ms, on a busy computer
 SEEN = Path(tempfile.gettempdir()) / "rds-screenshots"  # of tests that fail
 KEPT = Path(os.environ["RDS_SCREENSHOTS"]) if "RDS_SCREENSHOTS" in os.environ else None  # of all tests
-FAILED = pytest.StashKey[bool]()
-SPOILED = pytest.StashKey[bool]()  # of a file whose page a test that failed may have left anyhow
+FAILED = pytest.StashKey[bool]()  # of a test, or of the last one of a file
+PAGES = pytest.StashKey[list[Any]]()  # of a test, or those that the tests of a file share
 PROGRAM_TEXT = "document.querySelector('.rds-editor').view.state.doc.toString()"  # the page has the lines in sight
 
 
@@ -42,8 +42,8 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     """Lets the fixtures of a test see that it has failed."""
     report = yield
     item.stash[FAILED] = report.failed or item.stash.get(FAILED, False)
-    if report.failed and (file := item.getparent(pytest.Module)) is not None:
-        file.stash[FAILED] = file.stash[SPOILED] = True
+    if (file := item.getparent(pytest.Module)) is not None:
+        file.stash[FAILED] = report.failed or (report.when != "setup" and file.stash.get(FAILED, False))
     return report
 
 
@@ -138,7 +138,7 @@ def new_page_for_all(browser: Any, request: pytest.FixtureRequest) -> Iterator[C
 
 
 def _pages(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
-    pages: list[Any] = []
+    pages: list[Any] = request.node.stash.setdefault(PAGES, [])
     contexts: list[Any] = []
     abroad: list[str] = []
 
@@ -163,14 +163,27 @@ def _pages(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[..
         return page
 
     yield make
-    name = re.sub(r"\W+", "-", request.node.name).strip("-")
-    for number, page in enumerate(pages):
-        if KEPT or request.node.stash.get(FAILED, False):
-            page.screenshot(path=(KEPT or SEEN) / f"{name}-{number}.png")
-        page.close()
+    _keep_pictures(pages, request.node)
+    while pages:
+        pages.pop().close()
     for context in contexts:
         context.close()
     assert not abroad, f"the page asked other hosts: {abroad}"
+
+
+def _keep_pictures(pages: list[Any], node: pytest.Item | pytest.Collector) -> None:
+    if KEPT or node.stash.get(FAILED, False):
+        name = re.sub(r"\W+", "-", node.name).strip("-")
+        for number, page in enumerate(pages):
+            page.screenshot(path=(KEPT or SEEN) / f"{name}-{number}.png")
+
+
+@pytest.fixture
+def spoiled(request: pytest.FixtureRequest) -> Iterator[bool]:
+    """Whether the test of this file before this one has failed: it may have left a page that they share anyhow."""
+    file = request.node.getparent(pytest.Module)
+    yield file.stash.get(FAILED, False)
+    _keep_pictures(file.stash.get(PAGES, []), request.node)
 
 
 def see(page: Any, selector: str, state: str = "visible", timeout: float = PATIENCE) -> Any:
@@ -242,17 +255,15 @@ def turn_to(page: Any, panel: str) -> None:
 
 
 @pytest.fixture
-def same_page(page_for_all: Any, folders: set[Path], app: App, request: pytest.FixtureRequest) -> Callable[[str], Any]:
+def same_page(page_for_all: Any, folders: set[Path], app: App, spoiled: bool) -> Callable[[str], Any]:
     """Go to a panel of the page that the tests of a file share. It is light, 1280 x 800 px, and the panel as the test
     before has left it; but after one that failed the page is a new one.
     """
-    file = request.node.getparent(pytest.Module)
+    if spoiled:
+        page_for_all.goto(app.url)
 
     def show(panel: str) -> Any:
         folders.add(app.folder)
-        if file.stash.get(SPOILED, False):
-            page_for_all.goto(app.url)
-            file.stash[SPOILED] = False
         page_for_all.set_viewport_size({"width": 1280, "height": 800})
         turn_to(page_for_all, panel)
         if page_for_all.locator(".rds-app.rds-dark").count():

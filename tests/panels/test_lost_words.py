@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rds.panels.jog import loop
-from tests.panels.conftest import SPOILED, App, begin_with, turn_to
+from tests.panels.conftest import App, begin_with, turn_to
 
 LOSES = """
 window.lost = null; // the kind of words that are lost
@@ -36,12 +36,10 @@ def losing_page(app: App, new_page_for_all: Callable[..., Any]) -> Any:
 
 
 @pytest.fixture
-def page(losing_page: Any, request: pytest.FixtureRequest) -> Any:
+def page(losing_page: Any, spoiled: bool) -> Any:
     """The same, of which nothing is lost yet; loaded again after a test that failed."""
-    file = request.node.getparent(pytest.Module)
-    if file.stash.get(SPOILED, False):
+    if spoiled:
         losing_page.reload()
-        file.stash[SPOILED] = False
     losing_page.keyboard.up("Enter")
     losing_page.wait_for_selector(".rds-rescue-box", state="attached")
     losing_page.evaluate("window.lost = null; window.tried = 0")
