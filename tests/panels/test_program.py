@@ -194,8 +194,9 @@ def test_a_run_is_held_resumed_changed_and_stopped_in_the_middle(same_page: Call
     assert re.search(r"override\s+1\s+1\.05\s", page.inner_text(".rds-main"))
 
 
-def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(same_page: Callable[[str], Any]) -> None:
+def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(same_page: Callable[[str], Any], app: App) -> None:
     page = opened(same_page)
+    before = reports(app)
     write(page, lines("G1 X1 F600", "M0", "G1 X70 F120"))
     page.wait_for_selector(VALID)
     page.click('button:text-is("Emulation")')
@@ -205,6 +206,8 @@ def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(same_page: Call
     page.wait_for_selector('.rds-state:has-text("Line 4 runs")')
     page.click('button:text-is("Home")')
     page.wait_for_selector('.rds-notice:has-text("ended early: went home from line 4")')
+    wait_for(lambda: reports(app) - before)  # which the panel turns to, before the next test is on the page
+    page.wait_for_selector('.rds-main :text("Saved with its report in")', timeout=SAVED)
 
 
 def test_a_simulation_ends_with_its_worst_lines(same_page: Callable[[str], Any], app: App) -> None:
