@@ -58,7 +58,17 @@ HERE = Path(__file__).parent
 PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one
 POLITE = 10  # niceness of the others
 MARK = "pytest.mark.realtime"
-BROWSER = {"app", "browser", "new_page", "open_page", "second_app", "start_app"}  # fixtures of tests/panels/conftest.py
+BROWSER = {  # fixtures of tests/panels/conftest.py
+    "app",
+    "browser",
+    "new_page",
+    "new_page_for_all",
+    "open_page",
+    "page_for_all",
+    "same_page",
+    "second_app",
+    "start_app",
+}
 # They wait for modules' heartbeats or run short and may be late, and follow the panels: both lanes take as long.
 SECOND = ("/oacs/", "/safety/", "/test_readme.py", "/test_notebooks.py", "/test_demo.py")
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more

@@ -23,8 +23,10 @@ def main(
     from rds.core.extras import needed_for
 
     with needed_for("a panel"):
+        from rds.panels.kit.made_at_once import made_at_once
         from rds.panels.page.shell import Shell
         from rds.panels.session import Session
 
     PANELS.module(panel)
-    return Shell(Session(folder, machine, bus), panel).widget
+    with made_at_once():
+        return Shell(Session(folder, machine, bus), panel).widget

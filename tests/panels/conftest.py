@@ -23,7 +23,8 @@ HOW = "no Chromium here: install it (Debian: apt-get install chromium) to run th
 PATIENCE = 60_000  # ms, on a busy computer
 SEEN = Path(tempfile.gettempdir()) / "rds-screenshots"  # of tests that fail
 KEPT = Path(os.environ["RDS_SCREENSHOTS"]) if "RDS_SCREENSHOTS" in os.environ else None  # of all tests
-FAILED = pytest.StashKey[bool]()
+FAILED = pytest.StashKey[bool]()  # of a test, or of the last one of a file
+PAGES = pytest.StashKey[list[Any]]()  # of a test, or those that the tests of a file share
 PROGRAM_TEXT = "document.querySelector('.rds-editor').view.state.doc.toString()"  # the page has the lines in sight
 
 
@@ -41,6 +42,8 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     """Lets the fixtures of a test see that it has failed."""
     report = yield
     item.stash[FAILED] = report.failed or item.stash.get(FAILED, False)
+    if (file := item.getparent(pytest.Module)) is not None:
+        file.stash[FAILED] = report.failed or (report.when != "setup" and file.stash.get(FAILED, False))
     return report
 
 
@@ -72,12 +75,17 @@ def start_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[...
         raise AssertionError("rds app did not start:\n" + log.read_text())
 
     yield start
-    going = [app.process for app in started if app.process.poll() is None]
-    for process in going:  # they end beside each other
+    end(*started)
+    shutil.rmtree(runtime, ignore_errors=True)
+
+
+def end(*apps: App) -> None:
+    """End them beside each other."""
+    going = [app.process for app in apps if app.process.poll() is None]
+    for process in going:
         os.killpg(process.pid, signal.SIGTERM)
     for process in going:
         process.wait(20)
-    shutil.rmtree(runtime, ignore_errors=True)
 
 
 @pytest.fixture(scope="package")
@@ -120,7 +128,17 @@ def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[
     With a `clock`, time can be put forward. A screenshot of each page is kept at the end of a test that fails, in a
     temporary folder, and of any test in $RDS_SCREENSHOTS.
     """
-    pages: list[Any] = []
+    yield from _pages(browser, request)
+
+
+@pytest.fixture(scope="module")
+def new_page_for_all(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
+    """The same of a page that the tests of a file share: loading one takes longer than most of what is done there."""
+    yield from _pages(browser, request)
+
+
+def _pages(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
+    pages: list[Any] = request.node.stash.setdefault(PAGES, [])
     contexts: list[Any] = []
     abroad: list[str] = []
 
@@ -145,14 +163,27 @@ def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[
         return page
 
     yield make
-    name = re.sub(r"\W+", "-", request.node.name).strip("-")
-    for number, page in enumerate(pages):
-        if KEPT or request.node.stash.get(FAILED, False):
-            page.screenshot(path=(KEPT or SEEN) / f"{name}-{number}.png")
-        page.close()
+    _keep_pictures(pages, request.node)
+    while pages:
+        pages.pop().close()
     for context in contexts:
         context.close()
     assert not abroad, f"the page asked other hosts: {abroad}"
+
+
+def _keep_pictures(pages: list[Any], node: pytest.Item | pytest.Collector) -> None:
+    if KEPT or node.stash.get(FAILED, False):
+        name = re.sub(r"\W+", "-", node.name).strip("-")
+        for number, page in enumerate(pages):
+            page.screenshot(path=(KEPT or SEEN) / f"{name}-{number}.png")
+
+
+@pytest.fixture
+def spoiled(request: pytest.FixtureRequest) -> Iterator[bool]:
+    """Whether the test of this file before this one has failed: it may have left a page that they share anyhow."""
+    file = request.node.getparent(pytest.Module)
+    yield file.stash.get(FAILED, False)
+    _keep_pictures(file.stash.get(PAGES, []), request.node)
 
 
 def see(page: Any, selector: str, state: str = "visible", timeout: float = PATIENCE) -> Any:
@@ -172,9 +203,8 @@ def see(page: Any, selector: str, state: str = "visible", timeout: float = PATIE
 
 @pytest.fixture
 def folders() -> Iterator[set[Path]]:
-    """Those of the pages that a test opens. At its end, and however it ends, no run goes on there, the machine is
-    free, and nothing is left but the runs: the next test, or the same one tried again, begins as in a new
-    folder.
+    """Those of the pages that a test opens or uses. At its end, and however it ends, no run goes on there, the machine
+    is free, and nothing is left but the runs: the next test, or the same one tried again, begins as in a new folder.
     """
     from rds.core.errors import InputError
     from rds.panels.session import Session
@@ -208,6 +238,42 @@ def _empty(folder: Path) -> None:
             left.unlink(missing_ok=True)
 
 
+@pytest.fixture(scope="module")
+def page_for_all(new_page_for_all: Callable[..., Any], app: App) -> Any:
+    """A page of the app for all tests of a file."""
+    page = new_page_for_all(1280, 800)
+    page.goto(app.url)
+    page.wait_for_selector(".rds-app .rds-nav button")
+    return page
+
+
+def turn_to(page: Any, panel: str) -> None:
+    """Go to a panel of a page by its title."""
+    page.click(f'.rds-nav button:text-is("{panel}")')
+    page.wait_for_selector(f'.rds-title h1:text-is("{panel}")')
+    page.wait_for_selector(".rds-panel:not(.rds-opening)")
+
+
+@pytest.fixture
+def same_page(page_for_all: Any, folders: set[Path], app: App, spoiled: bool) -> Callable[[str], Any]:
+    """Go to a panel of the page that the tests of a file share. It is light, 1280 x 800 px, and the panel as the test
+    before has left it; but after one that failed the page is a new one.
+    """
+    if spoiled:
+        page_for_all.goto(app.url)
+
+    def show(panel: str) -> Any:
+        folders.add(app.folder)
+        page_for_all.set_viewport_size({"width": 1280, "height": 800})
+        turn_to(page_for_all, panel)
+        if page_for_all.locator(".rds-app.rds-dark").count():
+            page_for_all.click('.rds-head button:text-is("Dark")')
+            page_for_all.wait_for_selector(".rds-app:not(.rds-dark)")
+        return page_for_all
+
+    return show
+
+
 @pytest.fixture
 def open_page(folders: set[Path], new_page: Callable[..., Any], app: App) -> Callable[..., Any]:
     """Open a page of the app, or of another one, at a panel by its title; with a `clock`, time can be put forward."""
@@ -220,9 +286,7 @@ def open_page(folders: set[Path], new_page: Callable[..., Any], app: App) -> Cal
         page.goto((on or app).url)
         page.wait_for_selector(".rds-app .rds-nav button")
         if panel is not None:
-            page.click(f'.rds-nav button:text-is("{panel}")')
-            page.wait_for_selector(f'.rds-title h1:text-is("{panel}")')
-            page.wait_for_selector(".rds-panel:not(.rds-opening)")
+            turn_to(page, panel)
         return page
 
     return show

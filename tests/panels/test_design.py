@@ -36,14 +36,18 @@ def _type(page: Any, label: str, text: str) -> None:
 
 
 def _ready(page: Any) -> Any:
+    """The first pole of the panel, at the place where it begins."""
+    _type(page, "Real part", "-32")
+    _type(page, "Imaginary part", "24")
+    page.wait_for_selector('.rds-splane-row .scroll:has-text("1600")')
     pole = page.locator('.rds-splane-pole[tabindex="0"]').first
     pole.wait_for()
     page.wait_for_function("document.querySelectorAll('.rds-curves svg').length == 6")
     return pole
 
 
-def test_a_pole_is_moved_with_the_mouse_and_the_keys_and_the_design_follows(open_page: Callable[..., Any]) -> None:
-    page = open_page("Design")
+def test_a_pole_is_moved_with_the_mouse_and_the_keys_and_the_design_follows(same_page: Callable[[str], Any]) -> None:
+    page = same_page("Design")
     pole = _ready(page)
     assert "1600" in _numbers(page)
     while (box := pole.bounding_box()) is None:  # while it is drawn anew
@@ -79,8 +83,8 @@ def test_a_pole_is_moved_with_the_mouse_and_the_keys_and_the_design_follows(open
     _shows(page, "Imaginary part", "34")
 
 
-def test_a_place_that_is_not_stable_is_refused_with_the_reason_in_the_dark_too(open_page: Callable[..., Any]) -> None:
-    page = open_page("Design")
+def test_a_place_that_is_not_stable_is_refused_with_the_reason_in_the_dark_too(same_page: Callable[[str], Any]) -> None:
+    page = same_page("Design")
     page.click('button:text-is("Dark")')
     pole = _ready(page)
     page.wait_for_selector('.rds-main:has-text("axes drawn from the ranges")')
@@ -107,8 +111,8 @@ def test_a_place_that_is_not_stable_is_refused_with_the_reason_in_the_dark_too(o
     page.wait_for_selector(".rds-splane-row .scroll")
 
 
-def test_the_file_is_written_checked_asked_about_and_tried(open_page: Callable[..., Any], app: App) -> None:
-    page = open_page("Design")
+def test_the_file_is_written_checked_asked_about_and_tried(same_page: Callable[[str], Any], app: App) -> None:
+    page = same_page("Design")
     _ready(page)
     _type(page, "File", "dragged.py")
     page.click('button:text-is("Write the file")')

@@ -14,8 +14,8 @@ GOOD, BAD = ".rds-verdict .rds-notice-good", ".rds-verdict .rds-notice-error"
 LEFT, TOP = 30, 18  # px from the canvas's corner to the first cell
 
 
-def opened(open_page: Callable[..., Any]) -> Any:
-    page = open_page("Drawing")
+def opened(same_page: Callable[[str], Any]) -> Any:
+    page = same_page("Drawing")
     page.wait_for_selector(f"{GOOD}, {BAD}")
     return page
 
@@ -34,8 +34,8 @@ def stroke(page: Any, start: tuple[int, int], end: tuple[int, int]) -> None:
     page.mouse.up()
 
 
-def test_cells_are_drawn_traced_and_made_into_a_program(open_page: Callable[..., Any], app: App) -> None:
-    page = opened(open_page)
+def test_cells_are_drawn_traced_and_made_into_a_program(same_page: Callable[[str], Any], app: App) -> None:
+    page = opened(same_page)
     page.click('.rds-cells-bar button:text-is("Clear")')
     page.wait_for_selector(f'{BAD}:has-text("there is no outline to trace")')
     for row in range(4, 8):
@@ -51,9 +51,9 @@ def test_cells_are_drawn_traced_and_made_into_a_program(open_page: Callable[...,
 
 
 def test_cells_are_filled_with_the_keys_and_two_islands_are_refused_with_their_places(
-    open_page: Callable[..., Any],
+    same_page: Callable[[str], Any],
 ) -> None:
-    page = opened(open_page)
+    page = opened(same_page)
     page.click('.rds-cells-bar button:text-is("Clear")')
     page.wait_for_selector('.rds-cells[data-filled="0"]')
     page.focus(".rds-cells canvas")
@@ -72,13 +72,13 @@ def test_cells_are_filled_with_the_keys_and_two_islands_are_refused_with_their_p
     page.wait_for_selector('.rds-main .rds-notice:has-text("has 2 islands")')
 
 
-def test_a_picture_of_the_folder_is_traced(open_page: Callable[..., Any], app: App) -> None:
+def test_a_picture_of_the_folder_is_traced(same_page: Callable[[str], Any], app: App) -> None:
     image = pytest.importorskip("PIL.Image", reason="pillow is not installed: it is in the extra drawing")
     across, up = np.meshgrid(np.arange(60), np.arange(60))
     disc = np.hypot(across - 30, up - 30) < 20
     path = app.folder.parent / "disc.png"
     image.fromarray(np.where(disc, 0, 255).astype(np.uint8)).save(path)
-    page = opened(open_page)
+    page = opened(same_page)
     page.click('button:text-is("Picture")')
     page.wait_for_selector('.rds-verdict .rds-notice-note:has-text("choose a picture")')
     with page.expect_file_chooser() as chooser:

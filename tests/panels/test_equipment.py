@@ -31,6 +31,7 @@ class Equipment:
 
     def __init__(self, page: Any):
         self.page = page
+        self._before = self._saved_in()
 
     def field(self, label: str) -> Any:
         return self.page.locator(".rds-field:visible", has_text=label).first
@@ -66,6 +67,8 @@ class Equipment:
         return str(text.inner_text())
 
     def press(self, text: str) -> None:
+        if text == "Run":
+            self._before = self._saved_in()
         self.page.click(f'button:visible:text-is("{text}")')
 
     def tab(self, title: str) -> None:
@@ -74,41 +77,45 @@ class Equipment:
     def sees(self, text: str) -> None:
         self.page.wait_for_selector(f':text("{text}"):visible')
 
-    def notice(self) -> str:
-        line = self.page.locator(".rds-main > .rds-notice [role]:visible").first
-        line.wait_for()
-        return str(line.inner_text())
+    def says(self, text: str) -> None:
+        """Wait for what is said over the panel."""
+        self.page.wait_for_selector(f'.rds-main > .rds-notice [role]:visible:has-text("{text}")')
 
     def run(self) -> Path:
-        """Run, and wait for the files of this run, not of one before it."""
-        place = self.page.locator(':text("Saved with its report in") code')
-        before = place.inner_text() if place.count() else ""
+        """Run, and wait for the files of this run."""
         self.press("Run")
-        self.page.wait_for_function(
-            """(before) => [...document.querySelectorAll('code')].some(
-                (each) => each.parentElement.innerText.startsWith('Saved with') && each.innerText !== before)""",
-            arg=before,
-        )
         return self.saved()
 
     def saved(self) -> Path:
-        """Wait until the run's files are written; their folder."""
-        self.sees("Saved with its report in")
-        return Path(self.page.inner_text(':text("Saved with its report in") code'))
+        """Wait until the files of the run are written, not of one that was shown before it; their folder."""
+        self.page.wait_for_function(
+            """(before) => [...document.querySelectorAll('code')].some(
+                (each) => each.offsetParent && each.parentElement.innerText.startsWith('Saved with')
+                    && each.innerText !== before)""",
+            arg=self._before,
+        )
+        return Path(self._saved_in())
+
+    def _saved_in(self) -> str:
+        place = self.page.locator(':text("Saved with its report in") code')
+        return str(place.inner_text()) if place.count() else ""
 
 
 @pytest.fixture
-def at(open_page: Callable[..., Any]) -> Callable[..., Equipment]:
-    """Open an equipment panel, with the choices of a first run of half a second."""
+def at(same_page: Callable[[str], Any]) -> Callable[..., Equipment]:
+    """Go to an equipment panel, with the choices of a first run of half a second."""
 
-    def show(panel: str = "Equipment control", **options: Any) -> Equipment:
-        equipment = Equipment(open_page(panel, **options))
+    def show(panel: str = "Equipment control") -> Equipment:
+        equipment = Equipment(same_page(panel))
         equipment.choose("System", "X axis")
         equipment.choose("Mode", "Simulation")
         equipment.choose("Voltage signal" if panel == "Equipment model" else "Reference", "Sinusoid")
         equipment.type("Final time", "0.5")
+        equipment.type("Sample period", "0.001")
         if panel == "Equipment control":
             equipment.choose("Controller", "Proportional")
+            for label, value in (("Amplitude", "5"), ("Frequency", "0.2"), ("Offset", "0")):
+                equipment.type(label, value)
         return equipment
 
     return show
@@ -123,7 +130,7 @@ def test_three_actions_from_the_page_to_a_tracked_sine(second_app: App, open_pag
     page.wait_for_selector(':text("RMS error"):visible')
     page.wait_for_selector(".rds-figure canvas:visible")
     assert page.evaluate("window.actions") <= 3
-    assert "done: 10000 samples" in Equipment(page).notice()
+    Equipment(page).says("done: 10000 samples")
     wide = page.evaluate("[document.documentElement.scrollWidth, window.innerWidth]")
     assert wide[0] <= wide[1]
 
@@ -140,7 +147,7 @@ def test_wrong_values_are_refused_beside_their_fields(at: Callable[..., Equipmen
         control.type(label, value)
         assert reason in control.refusal(label)
     control.press("Run")
-    assert "first mend what is refused on the left: Amplitude, Frequency, Offset" in control.notice()
+    control.says("first mend what is refused on the left: Amplitude, Frequency, Offset")
     for label, value in (("Amplitude", "5"), ("Frequency", "0,2"), ("Offset", "0"), ("Final time", "0.5")):
         control.type(label, value)
     control.type("Sample period", "0.001 s")
@@ -165,7 +172,7 @@ def test_a_fault_is_marked_at_its_line(at: Callable[..., Equipment], app: Any) -
     control.press("Build")
     fault = control.page.wait_for_selector(".rds-source-fault:visible")
     assert fault.inner_text().split() == ["2", "error", "=", "r.positoin", "-", "y"]
-    assert "faulty.py, line 2" in control.notice()
+    control.says("faulty.py, line 2")
     assert control.page.locator("svg[role=img]:visible").get_attribute("aria-label").count("faulty.py") == 1
     (app.folder / "faulty.py").write_text(FAULTY.replace("positoin", "position"))
     control.press("Build")
@@ -180,7 +187,7 @@ def test_a_gain_changes_while_it_runs_and_a_run_is_stopped(at: Callable[..., Equ
     control.type("Final time", "600")  # it is stopped, however long the steps before take
     control.type("Sample period", "0.005")  # a loop of 1 ms would take the page's processor
     control.press("Load")
-    assert "loaded: 120000 samples, 5 ms each" in control.notice()
+    control.says("loaded: 120000 samples, 5 ms each")
     control.press("Run")
     gain = control.page.locator(".rds-live-values .rds-field:visible", has_text="Pgain")
     number, slider = gain.locator("input[type=text]"), gain.locator("input[type=range]")
@@ -317,7 +324,7 @@ def test_the_panel_as_a_file(at: Callable[..., Equipment], app: Any) -> None:
     control.sees("in a terminal: rds run mine.toml")
     assert tomllib.loads((app.folder / "mine.toml").read_text()) == table
     control.press("Save the file")
-    control.sees("there is such a file already")
+    control.sees("mine.toml: there is such a file already")
 
 
 def test_a_result_is_saved_and_sent(at: Callable[..., Equipment], app: Any) -> None:
@@ -342,7 +349,7 @@ def test_a_result_is_saved_and_sent(at: Callable[..., Equipment], app: Any) -> N
     control.sees("saved as")
     assert (app.folder / "kept.csv").is_file()
     control.press("Save")
-    control.sees("there is such a file already")
+    control.sees("kept.csv: there is such a file already")
     control.type("E-mail to", "me at home")
     assert "no e-mail address" in control.refusal("E-mail to")
     control.type("E-mail to", "me@example.edu")

@@ -17,7 +17,7 @@ from rds.core.errors import MachineError
 from rds.panels.app.whereabouts import ask, own_line
 from rds.panels.page.shell import Rescue, Shell
 from rds.panels.session import Session
-from tests.panels.conftest import App, begin_with
+from tests.panels.conftest import App, begin_with, turn_to
 from tests.panels.test_interrupted import wait_for
 
 CONTROLLER = '''"""Proportional control, until a sample that no check gets to."""
@@ -43,14 +43,24 @@ def held_app(second_app: App) -> App:
     return second_app
 
 
+@pytest.fixture(scope="module")
+def clock_page(new_page_for_all: Callable[..., Any]) -> Any:
+    """A page whose time can be put forward."""
+    return new_page_for_all(1280, 800, clock=True)
+
+
 @pytest.fixture
-def run_until(held_app: App, open_page: Callable[..., Any], new_page: Any) -> Callable[[str], Any]:
+def run_until(held_app: App, clock_page: Any, folders: set[Path]) -> Callable[[str], Any]:
     """A page whose simulation has come to this statement of its controller, as it looks some seconds later."""
 
     def run(last: str) -> Any:
         (held_app.folder / "own.py").write_text(CONTROLLER.format(last=last))
         (held_app.folder / "there").unlink(missing_ok=True)
-        page = open_page("Equipment control", on=held_app, clock=True)
+        folders.add(held_app.folder)
+        page = clock_page
+        page.goto(held_app.url)
+        page.wait_for_selector(".rds-app .rds-nav button")
+        turn_to(page, "Equipment control")
         page.click('button:visible:text-is("Run")')
         wait_for((held_app.folder / "there").is_file)
         page.clock.run_for(HELD)

@@ -22,6 +22,16 @@ def _type(page: Any, label: str, text: str) -> None:
     field.press("Enter")
 
 
+def _opened(same_page: Callable[[str], Any]) -> Any:
+    """The panel at the arc that it begins with."""
+    page = same_page("Interpolator")
+    page.click('button:text-is("Circular")')
+    page.click('button:text-is("Single segment")')
+    _type(page, "Start", "10, 0")
+    _type(page, "End", "0, 10")
+    return page
+
+
 def _go(page: Any, done: str = '.rds-notice-good:has-text("done:")') -> None:
     page.click('button:text-is("Interpolate")')
     page.wait_for_selector(done)
@@ -32,8 +42,8 @@ def _turn_to(page: Any, picture: str) -> None:
     page.wait_for_function(PAINTED)  # by the kernel; the picture of the page is to be looked at
 
 
-def test_an_arc_with_its_errors_magnified(open_page: Callable[..., Any], app: App) -> None:
-    page = open_page("Interpolator")
+def test_an_arc_with_its_errors_magnified(same_page: Callable[[str], Any], app: App) -> None:
+    page = _opened(same_page)
     page.select_option('.rds-field:has(.rds-label:has-text("Method for arcs")) select', "improved tustin")
     page.wait_for_selector('.rds-label:has-text("blu (arcs) [mm]")')
     _go(page)
@@ -47,8 +57,8 @@ def test_an_arc_with_its_errors_magnified(open_page: Callable[..., Any], app: Ap
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
 
 
-def test_the_machine_goes_along_the_arc_and_the_model_is_drawn(open_page: Callable[..., Any]) -> None:
-    page = open_page("Interpolator")
+def test_the_machine_goes_along_the_arc_and_the_model_is_drawn(same_page: Callable[[str], Any]) -> None:
+    page = _opened(same_page)
     page.click('button:text-is("View model")')
     page.wait_for_selector('svg[aria-label*="Circular (interpolator"]')
     _go(page)
@@ -61,8 +71,8 @@ def test_the_machine_goes_along_the_arc_and_the_model_is_drawn(open_page: Callab
     assert int(page.locator(".rds-scene").get_attribute("data-rows")) > 100
 
 
-def test_a_table_of_segments_and_what_it_refuses(open_page: Callable[..., Any]) -> None:
-    page = open_page("Interpolator")
+def test_a_table_of_segments_and_what_it_refuses(same_page: Callable[[str], Any]) -> None:
+    page = _opened(same_page)
     page.click('button:text-is("Both")')
     page.click('button:text-is("Several")')
     _type(page, "Start", "0, 0")
@@ -84,11 +94,11 @@ def test_a_table_of_segments_and_what_it_refuses(open_page: Callable[..., Any]) 
 
 
 def test_a_part_program_a_faulty_one_and_a_user_s_file_with_its_fault_at_its_line(
-    open_page: Callable[..., Any], app: App
+    same_page: Callable[[str], Any], app: App
 ) -> None:
     (app.folder / "good.ngc").write_text("G21 G90 G17 F600\nG1 X10 Y0\nG3 X0 Y10 I-10 J0\nM2\n")
     (app.folder / "bad.ngc").write_text("G21 G90 F600\nG1 X10 Q\nM2\n")
-    page = open_page("Interpolator")
+    page = _opened(same_page)
     page.click('button:text-is("Both")')
     page.click('button:text-is("Your G-code")')
     _type(page, "Part program", "bad.ngc")
@@ -108,8 +118,8 @@ def test_a_part_program_a_faulty_one_and_a_user_s_file_with_its_fault_at_its_lin
     _go(page, '.rds-notice-error:has-text("broken.py, line 3")')
 
 
-def test_refusals_beside_their_fields(open_page: Callable[..., Any]) -> None:
-    page = open_page("Interpolator")
+def test_refusals_beside_their_fields(same_page: Callable[[str], Any]) -> None:
+    page = _opened(same_page)
     page.click('button:text-is("Dark")')
     page.click('button:text-is("Circular")')
     page.click('button:text-is("Single segment")')

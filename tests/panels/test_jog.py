@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.machines import load_machine
-from tests.panels.conftest import App
+from tests.panels.conftest import App, end
 
 SPEED = "parseFloat(document.querySelectorAll('.rds-jog-at')[3].innerText)"  # of the spindle, rev/min
 
@@ -88,7 +88,8 @@ def test_drives_are_held_turned_and_homed(
     (tmp_path / "small.toml").write_text(machine.replace('name = "mini-cnc"', 'name = "small-cnc"'))
     (tmp_path / "bus.toml").write_text('[bus]\nchannel = "bench"\ndialect = "cia402"\n')
     named = ("--machine", str(tmp_path / "small.toml"), "--experiment", str(tmp_path / "bus.toml"))
-    page = open_page("Machine", on=start_app(tmp_path, *named))
+    app = start_app(tmp_path, *named)
+    page = open_page("Machine", on=app)
     page.select_option('.widget-dropdown:has-text("cia402") select', "cia402: drives")
     page.click('button:text-is("Start modules")')
     page.wait_for_selector("td:has-text('cia402')")
@@ -119,3 +120,4 @@ def test_drives_are_held_turned_and_homed(
     page.click("button.rds-stop")
     page.wait_for_selector('.rds-notice:has-text("4 modules are at zero volts")')
     page.wait_for_selector('button[aria-label="X plus"]:disabled')
+    end(app)

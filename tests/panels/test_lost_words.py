@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rds.panels.jog import loop
-from tests.panels.conftest import App, begin_with
+from tests.panels.conftest import App, begin_with, turn_to
 
 LOSES = """
 window.lost = null; // the kind of words that are lost
@@ -26,14 +26,24 @@ window.WebSocket = class extends Real {
 HELD = 7000  # ms of the page's clock after which it says that it gets no answer
 
 
-@pytest.fixture
-def page(app: App, new_page: Callable[..., Any]) -> Any:
+@pytest.fixture(scope="module")
+def losing_page(app: App, new_page_for_all: Callable[..., Any]) -> Any:
     """A page whose words can be lost."""
-    page = new_page(1280, 800, clock=True)
+    page = new_page_for_all(1280, 800, clock=True)
     page.add_init_script(LOSES)
     page.goto(app.url)
-    page.wait_for_selector(".rds-rescue-box", state="attached")
     return page
+
+
+@pytest.fixture
+def page(losing_page: Any, spoiled: bool) -> Any:
+    """The same, of which nothing is lost yet; loaded again after a test that failed."""
+    if spoiled:
+        losing_page.reload()
+    losing_page.keyboard.up("Enter")
+    losing_page.wait_for_selector(".rds-rescue-box", state="attached")
+    losing_page.evaluate("window.lost = null; window.tried = 0")
+    return losing_page
 
 
 def test_a_page_whose_words_were_lost_is_answered_again(page: Any) -> None:
@@ -46,6 +56,7 @@ def test_a_page_whose_words_were_lost_is_answered_again(page: Any) -> None:
 
 
 def test_a_button_whose_word_was_lost_can_be_pressed_again(page: Any) -> None:
+    turn_to(page, "Main menu")
     page.click('.rds-head button:text-is("Dark")')  # a field, whose change the next click does not overtake
     page.evaluate("window.lost = 'settle'")
     page.click('.rds-nav button:text-is("Jog")')

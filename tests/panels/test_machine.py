@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
-from tests.panels.conftest import App
+from tests.panels.conftest import App, end
 
 DIALECT = '.rds-field:has(.rds-label:has-text("Dialect")) select'
 
@@ -24,9 +24,11 @@ def tab(page: Any, title: str) -> None:
 
 
 @pytest.fixture
-def own_app(start_app: Callable[..., App]) -> App:
+def own_app(start_app: Callable[..., App]) -> Iterator[App]:
     """An app for itself: what it serves is on its bus."""
-    return start_app(None, "--machine", "mrmt-oacs")
+    app = start_app(None, "--machine", "mrmt-oacs")
+    yield app
+    end(app)  # its kernel would go on listening to the bus
 
 
 def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_page: Callable[..., Any]) -> None:
@@ -68,8 +70,8 @@ def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_pag
     page.wait_for_selector(".rds-app.rds-dark")
 
 
-def test_a_gain_that_cannot_be_is_refused_beside_its_field(open_page: Callable[..., Any]) -> None:
-    page = open_page("Machine")
+def test_a_gain_that_cannot_be_is_refused_beside_its_field(same_page: Callable[[str], Any]) -> None:
+    page = same_page("Machine")
     tab(page, "3 Controllers")
     page.wait_for_selector('.rds-notice-warning:visible:has-text("no module with a controller is known")')
     field = page.locator('.rds-field:has(.rds-label:has-text("Kp")) input').first
@@ -89,8 +91,8 @@ def name_of(page: Any, name: str) -> Any:
     return {"label": page.locator(f"{MODULE} option", has_text=f": {name}, ").first.inner_text()}
 
 
-def test_a_machine_is_put_together_by_hand(app: App, open_page: Callable[..., Any]) -> None:
-    page = open_page("Machine")
+def test_a_machine_is_put_together_by_hand(app: App, same_page: Callable[[str], Any]) -> None:
+    page = same_page("Machine")
     tab(page, "By hand")
     mount(page, 1, "oacs-drill")
     mount(page, 2, "oacs-x")
@@ -105,9 +107,9 @@ def test_a_machine_is_put_together_by_hand(app: App, open_page: Callable[..., An
     assert 'module = "oacs-range-arm"' in (app.folder / "by-hand.toml").read_text()
 
 
-def test_a_machine_is_made_of_a_script(app: App, open_page: Callable[..., Any]) -> None:
+def test_a_machine_is_made_of_a_script(app: App, same_page: Callable[[str], Any]) -> None:
     """Limits alone change the machine that is chosen at Modules."""
-    page = open_page("Machine")
+    page = same_page("Machine")
     tab(page, "Script")
     text = page.locator("textarea:visible")
     text.fill("RF02 LN1 UP5 LW")

@@ -102,10 +102,10 @@ def ask(app: App, path: str, method: str = "GET", **headers: str) -> tuple[int, 
         connection.close()
 
 
-@pytest.fixture
-def shown(app: App, open_page: Callable[..., Any]) -> tuple[Any, str, dict[str, str]]:
+@pytest.fixture(scope="module")
+def shown(app: App, page_for_all: Any) -> tuple[Any, str, dict[str, str]]:
     """A page of the app, its kernel's name, and the app's cookies by their names."""
-    page = open_page()
+    page = page_for_all
     kernel = page.evaluate("JSON.parse(document.getElementById('jupyter-config-data').textContent).kernelId")
     path = urlsplit(app.url).path  # other servers of this computer, such as a JupyterLab's, may have set some for "/"
     cookies = {each["name"]: each["value"] for each in page.context.cookies(app.url) if each["path"] == path}

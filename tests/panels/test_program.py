@@ -21,6 +21,7 @@ from rds.nc.run.run import Status
 from rds.panels.program.status import status_html
 from rds.panels.program.words import words
 from tests.panels.conftest import PROGRAM_TEXT, App
+from tests.panels.test_interrupted import wait_for
 
 EDITOR = ".rds-editor .cm-content"
 SELECTED = "getSelection().toString()"
@@ -33,11 +34,17 @@ def lines(*middle: str) -> str:
     return "\n".join(("G21 G90 G94", *middle, "M2", ""))
 
 
-def opened(open_page: Callable[..., Any]) -> Any:
+def opened(open_page: Callable[[str], Any]) -> Any:
     """The panel, once it has looked at whatever an earlier test has left in the editor."""
     page = open_page("Program")
+    page.click('.lm-TabBar-tab:visible:has-text("Preview")')
     page.wait_for_selector(".rds-verdict .rds-notice-good, .rds-verdict .rds-notice-error")
     return page
+
+
+def reports(app: App) -> set[Path]:
+    """Of the runs of programs until now."""
+    return set(app.folder.glob("runs/*/program.html"))
 
 
 def write(page: Any, text: str) -> None:
@@ -67,8 +74,8 @@ def test_a_limit_that_is_near_is_said_by_a_sign() -> None:
     assert "–" in status_html(None, {}, machine, 100.0)
 
 
-def test_a_fault_is_marked_at_its_word_and_the_mark_goes_when_it_is_mended(open_page: Callable[..., Any]) -> None:
-    page = opened(open_page)
+def test_a_fault_is_marked_at_its_word_and_the_mark_goes_when_it_is_mended(same_page: Callable[[str], Any]) -> None:
+    page = opened(same_page)
     write(page, lines("G1 X10 Q5 F300"))
     word = page.locator(".rds-editor-word.rds-editor-error")
     page.wait_for_selector('.rds-editor-error[data-word="Q5"]')  # a check of a text half typed may have marked another
@@ -89,8 +96,8 @@ def test_each_word_of_the_interpreter_has_its_meaning() -> None:
     assert {word["label"].lower() for word in words() if word["kind"] == "function"} == set(FUNCTION.pattern.split("|"))
 
 
-def test_words_are_offered_and_say_what_they_mean(open_page: Callable[..., Any]) -> None:
-    page = opened(open_page)
+def test_words_are_offered_and_say_what_they_mean(same_page: Callable[[str], Any]) -> None:
+    page = opened(same_page)
     write(page, lines("(G2 in a remark)", "G2 X10 Y0 I5 J0 F300"))
     page.hover('.cm-line:has-text("G2 X10") .rds-editor-code')
     page.wait_for_selector('.rds-editor-meaning:has-text("G2 arc clockwise")')
@@ -110,10 +117,11 @@ def test_words_are_offered_and_say_what_they_mean(open_page: Callable[..., Any])
     page.keyboard.press("Enter")
     page.wait_for_selector('.cm-searchMatch-selected:has-text("remark")')
     page.wait_for_selector('.rds-editor-says:has-text("G83")')  # what was written is checked
+    page.keyboard.press("Escape")  # no search any more
 
 
-def test_what_leaves_the_travel_is_crossed_in_the_preview_in_the_dark_too(open_page: Callable[..., Any]) -> None:
-    page = opened(open_page)
+def test_what_leaves_the_travel_is_crossed_in_the_preview_in_the_dark_too(same_page: Callable[[str], Any]) -> None:
+    page = opened(same_page)
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
     page.click('button:text-is("Dark")')
     page.wait_for_selector(".rds-app.rds-dark")
@@ -125,10 +133,13 @@ def test_what_leaves_the_travel_is_crossed_in_the_preview_in_the_dark_too(open_p
         page.wait_for_selector(f'.rds-path canvas[aria-label^="{side} view"]')
     page.click('button:text-is("In space (3-D)")')
     page.wait_for_selector(".k3d-target canvas")
+    page.click('button:text-is("In space (3-D)")')  # which would be drawn on and on
 
 
-def test_a_text_that_was_not_saved_is_there_after_a_reload(open_page: Callable[..., Any], app: App) -> None:
-    page = opened(open_page)
+def test_a_text_that_was_not_saved_is_there_after_a_reload(
+    same_page: Callable[[str], Any], open_page: Callable[..., Any], app: App
+) -> None:
+    page = opened(same_page)
     write(page, lines("(unsaved words)", "G0 X1"))
     page.wait_for_selector('.rds-program :text("● ")')
     page.wait_for_selector(VALID)
@@ -142,8 +153,10 @@ def test_a_text_that_was_not_saved_is_there_after_a_reload(open_page: Callable[.
     assert "unsaved words" in (app.folder / "kept.ngc").read_text()
 
 
-def test_a_run_is_held_resumed_changed_and_stopped_in_the_middle(open_page: Callable[..., Any]) -> None:
-    page = opened(open_page)
+def test_a_run_is_held_resumed_changed_and_stopped_in_the_middle(same_page: Callable[[str], Any], app: App) -> None:
+    page = opened(same_page)
+    before = reports(app)
+    page.locator(".rds-override input").fill("100")
     write(page, lines("G1 X70 F120", "X0", "X70"))
     page.wait_for_selector(VALID)
     page.click('button:text-is("Emulation")')
@@ -176,12 +189,14 @@ def test_a_run_is_held_resumed_changed_and_stopped_in_the_middle(open_page: Call
     page.wait_for_selector('.rds-main :text("Where the contour error is largest")')
     page.click('.rds-main button:has-text("Line 2:")')
     page.wait_for_function(f"{SELECTED} === 'G1 X70 F120'")
+    wait_for(lambda: reports(app) - before)
     page.wait_for_selector('.rds-main :text("Saved with its report in")', timeout=SAVED)
     assert re.search(r"override\s+1\s+1\.05\s", page.inner_text(".rds-main"))
 
 
-def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(open_page: Callable[..., Any]) -> None:
-    page = opened(open_page)
+def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(same_page: Callable[[str], Any], app: App) -> None:
+    page = opened(same_page)
+    before = reports(app)
     write(page, lines("G1 X1 F600", "M0", "G1 X70 F120"))
     page.wait_for_selector(VALID)
     page.click('button:text-is("Emulation")')
@@ -191,10 +206,13 @@ def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(open_page: Call
     page.wait_for_selector('.rds-state:has-text("Line 4 runs")')
     page.click('button:text-is("Home")')
     page.wait_for_selector('.rds-notice:has-text("ended early: went home from line 4")')
+    wait_for(lambda: reports(app) - before)  # which the panel turns to, before the next test is on the page
+    page.wait_for_selector('.rds-main :text("Saved with its report in")', timeout=SAVED)
 
 
-def test_a_simulation_ends_with_its_worst_lines(open_page: Callable[..., Any], app: App) -> None:
-    page = opened(open_page)
+def test_a_simulation_ends_with_its_worst_lines(same_page: Callable[[str], Any], app: App) -> None:
+    page = opened(same_page)
+    before = reports(app)
     write(page, lines("G1 Z-0.5 F300", "X3", "Y3"))
     page.wait_for_selector(VALID)
     page.click('button:text-is("Simulation")')
@@ -210,8 +228,7 @@ def test_a_simulation_ends_with_its_worst_lines(open_page: Callable[..., Any], a
     assert gone == pytest.approx(0.5 * swept, rel=0.12) and over < 0.06 and under < 0.06
     page.click('.lm-TabBar-tab:visible:has-text("Result")')
     page.wait_for_selector('.rds-main :text("Saved with its report in")', timeout=SAVED)
-    found = [each for each in Path(app.folder / "runs").iterdir() if (each / "program.html").is_file()]
-    assert found
+    wait_for(lambda: reports(app) - before)
     page.set_viewport_size({"width": 640, "height": 800})  # what was beside the editor is below it
     page.wait_for_function("""() => {
         const [editor, result] = [".rds-editor", ".rds-program .rds-main"].map(

@@ -7,6 +7,8 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -24,6 +26,7 @@ from rds.core.parallel.forked import ForkedProcess
 from rds.panels.app import serve
 from rds.panels.app.provisioner import offer
 from rds.panels.app.ready_kernels import LAUNCHER, ReadyKernels
+from tests.conftest import LINGER, _processes
 
 APP = Path(serve.__file__).parent
 ASK = (
@@ -49,8 +52,24 @@ print(first == again, first[1] == os.getpid() == later[1], first[2:], later[2:])
 """
 
 
+@pytest.fixture(scope="module")
+def ready() -> Iterator[ReadyKernels]:
+    """For all tests that do not end it, whose kernels have ended soon after it."""
+    with tempfile.TemporaryDirectory(prefix="rds", dir="/tmp") as runtime:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("XDG_RUNTIME_DIR", runtime)
+            kernels = ReadyKernels()
+        yield kernels
+        kernels.close()
+        deadline = time.monotonic() + LINGER
+        while (left := _processes(Path(runtime))) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not left, f"left running: {left}"
+
+
 @pytest.fixture
-def ready(alone: Path) -> Iterator[ReadyKernels]:
+def own_ready(alone: Path) -> Iterator[ReadyKernels]:
+    """For one test."""
     kernels = ReadyKernels()
     yield kernels
     kernels.close()  # and `alone` fails the test if a process stays
@@ -103,7 +122,7 @@ os.wait()"""
 
 
 def test_what_a_forked_process_prints_comes_by_a_private_socket_as_all_else(
-    ready: ReadyKernels, monkeypatch: pytest.MonkeyPatch
+    ready: ReadyKernels, alone: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("JUPYTER_PATH", str(APP / "share" / "jupyter"))
     offer(ready)
@@ -144,8 +163,6 @@ def test_the_sockets_of_kernels_have_room_in_the_longest_runtime_directory() -> 
 
 def test_a_kernel_that_is_not_of_this_kind_is_started_as_always(ready: ReadyKernels, alone: Path) -> None:
     assert ready.start(["julia", "-i", "kernel.jl"], os.environ, alone) is None
-    ready.close()
-    assert ready.start([sys.executable, *LAUNCHER, "-f", "connection.json"], os.environ, alone) is None
 
 
 def test_pages_that_ask_at_the_same_time_have_a_kernel_each(ready: ReadyKernels, alone: Path) -> None:
@@ -163,10 +180,11 @@ def test_pages_that_ask_at_the_same_time_have_a_kernel_each(ready: ReadyKernels,
             kernel.kill()
 
 
-def test_kernels_end_with_the_server_though_compiled_code_holds_one(
-    ready: ReadyKernels, alone: Path, monkeypatch: pytest.MonkeyPatch
+def test_kernels_end_with_the_server_though_compiled_code_holds_one_and_are_started_as_always_then(
+    own_ready: ReadyKernels, alone: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("JUPYTER_PATH", str(APP / "share" / "jupyter"))
+    ready = own_ready
     offer(ready)
     manager: Any = KernelManager(kernel_name="rds", connection_file=str(alone / "connection.json"))
     manager.start_kernel(cwd=str(alone), env=os.environ | {"SAID": "", "APP": ""})
@@ -185,13 +203,14 @@ def test_kernels_end_with_the_server_though_compiled_code_holds_one(
             idle.wait(0.0)
         ready.close()
         assert kernel.wait(30.0) == idle.wait(30.0) == 0
+        assert ready.start([sys.executable, *LAUNCHER, "-f", "connection.json"], os.environ, alone) is None
     finally:
         client.stop_channels()
         kernel.kill()
         idle.kill()
 
 
-MANY = 20_000  # a panel that is opened is up to 948; ZeroMQ keeps 2,000 of its own, and a socket some more
+MANY = 20_000  # a panel that is opened is up to 272; ZeroMQ keeps 2,000 of its own, and a socket some more
 PANEL_OPENS = f"""
 kernel = get_ipython().kernel
 for number in range({MANY}):

@@ -8,6 +8,7 @@ kernel that it wants, and gets a line with the number of its process. The end of
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 import os
 import select
@@ -110,6 +111,7 @@ def _fork_for_each(channel: socket.socket) -> dict[str, Any] | None:
     """In each forked process what it was told, ready to be a kernel; None in this one, at the end of the channel."""
     from rds.panels.session.beside import IDLE, import_for_pictures
 
+    gc.freeze()  # what all kernels have: no kernel goes through it, and so has a copy of it
     with channel, channel.makefile("r", encoding="utf-8") as lines:
         while line := lines.readline():
             pid = fork_quietly()
@@ -119,6 +121,8 @@ def _fork_for_each(channel: socket.socket) -> dict[str, Any] | None:
             channel.sendall(f"{pid}\n".encode())
             if not select.select([channel], [], [], IDLE)[0]:
                 import_for_pictures()
+                _get_compiled_ready()
+                gc.freeze()
         else:
             return None
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
@@ -129,6 +133,15 @@ def _fork_for_each(channel: socket.socket) -> dict[str, Any] | None:
     if (numpy := sys.modules.get("numpy")) is not None:
         numpy.random.seed()  # or all kernels would draw the same
     return told
+
+
+def _get_compiled_ready() -> None:
+    """What numba does before it loads its first kernel from the disk: half a second of the first check of a program."""
+    with contextlib.suppress(Exception):  # it is not installed, or another one
+        from numba.core.registry import cpu_target
+
+        cpu_target.typing_context.refresh()
+        cpu_target.target_context.refresh()
 
 
 if __name__ == "__main__":

@@ -93,7 +93,7 @@ def _options(port: int | None, browser: bool, private: str) -> list[str]:
         "VoilaExecutor.iopub_timeout": SHOWN,
         "VoilaConfiguration.file_allowlist": "$.",  # a pattern that no file fits
         "VoilaConfiguration.multi_kernel_manager_class": "rds.panels.app.kernels.PageKernels",
-        # the limit is for what code prints; a panel is up to 948 messages, and one that is left out never shows
+        # the limit is for what code prints; a panel is up to 272 messages, and one that is left out never shows
         "ZMQChannelsWebsocketConnection.limit_rate": False,
         "MappingKernelManager.cull_idle_timeout": LEFT,
         "MappingKernelManager.cull_interval": 10,

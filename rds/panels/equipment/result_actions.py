@@ -64,16 +64,15 @@ class ResultActions:
 
     def offer(self, result: Result, folder: Path, sent: Sequence[str]) -> None:
         """The files are in `folder`; those of the names `sent` go by e-mail, and the first of them is the report."""
-        self._end()
-        self._result, self._folder, self._sent = result, folder, list(sent)
+        self._take(result, folder, sent)
         self.where.value = f"<p>Saved with its report in <code>{escape(str(folder))}</code>{self._link()}</p>"
-        self._rows.layout.display = ""
 
     def follow(self, result: Result, run: Saved, sent: Sequence[str]) -> None:
         """As `offer`, once the pictures and the report are there; the table can be saved elsewhere at once."""
-        self.offer(result, run.folder, sent)
         if run.written and run.unwritten is None:
+            self.offer(result, run.folder, sent)
             return
+        self._take(result, run.folder, sent)
         where = f"<code>{escape(str(run.folder))}</code>"
         self.where.value = f"<p>Its tables are in {where}; pictures and report follow …</p>"
 
@@ -84,6 +83,11 @@ class ResultActions:
                     say_error("the report", run.unwritten, self.notice)
 
         self._end = self._ticker.add(look)
+
+    def _take(self, result: Result, folder: Path, sent: Sequence[str]) -> None:
+        self._end()
+        self._result, self._folder, self._sent = result, folder, list(sent)
+        self._rows.layout.display = ""
 
     def clear(self) -> None:
         """There is nothing to save or send."""

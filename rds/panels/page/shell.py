@@ -15,6 +15,7 @@ import traitlets
 from rds.core.errors import RdsError
 from rds.panels.kit.button import button, order
 from rds.panels.kit.html import Html
+from rds.panels.kit.made_at_once import made_at_once
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.static_files import static
 from rds.panels.kit.ticker import Ticker
@@ -79,7 +80,8 @@ class Shell:
         about = f"{escape(self.session.machine)} · files in {escape(str(self.session.folder))}"
         self._title.value = f"<h1>{escape(module.TITLE)}</h1><p>{about}</p>"
         if name not in self.panels:
-            self.panels[name] = self._built(module)
+            with made_at_once():
+                self.panels[name] = self._built(module)
         self._place.children = [self.panels[name]]
         self._place.remove_class("rds-opening")
 
