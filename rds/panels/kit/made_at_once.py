@@ -13,9 +13,12 @@ from uuid import uuid4
 from weakref import ref
 
 import ipywidgets as widgets
-from ipywidgets.widgets.widget import _instances
+from ipywidgets.widgets import widget as inner
 
 _LOOKS = ("layout", "style")  # what most widgets have as ipywidgets makes it
+# ipywidgets' own, which another version may keep elsewhere: then each widget is told as it is made, as always
+_instances: dict[str, widgets.Widget] = getattr(inner, "_instances", {})
+_IS_KNOWN = hasattr(inner, "_instances") and hasattr(widgets.Widget, "_widget_construction_callback")
 
 
 class _Waiting:
@@ -74,7 +77,7 @@ _waiting: dict[int, widgets.Widget] | None = None  # those that are being made, 
 def made_at_once() -> Iterator[None]:
     """Within it no message is sent for the widgets that are made; at its end one for each, and for what it shows."""
     global _waiting
-    if _waiting is not None:
+    if _waiting is not None or not _IS_KNOWN:
         yield
         return
     _waiting, before = {}, widgets.Widget._widget_construction_callback
