@@ -111,7 +111,7 @@ def _slopes(
     """dx/dt as numbers of its own: a function may give the same array, or list, each time that it is asked."""
     answer = derivatives(t, np.array(x), u, params)
     kind = type(answer)
-    numbers = answer.tolist() if kind is np.ndarray else answer if kind is list or kind is tuple else ()
+    numbers = answer.tolist() if kind is np.ndarray and answer.ndim else answer if kind is list or kind is tuple else ()
     if len(numbers) == size and _FLOATS.issuperset(map(type, numbers)):
         return list(map(float, numbers))
     return _vector(answer, size, "derivatives", "dx/dt", where).tolist()

@@ -99,7 +99,7 @@ def test_a_student_cannot_change_the_state_that_was_handed_in():
     assert state.tolist() == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("answer", [[1.0], [1.0, 2.0, 3.0], None, "fast", 3.0, [None, 1.0], {1.0, 2.0}])
+@pytest.mark.parametrize("answer", [[1.0], [1.0, 2.0, 3.0], None, "fast", 3.0, np.array(3.0), [None, 1.0], {1.0, 2.0}])
 def test_answers_of_the_wrong_size_break_the_contract(answer):
     student = ode_model(lambda t, x, u, params: answer)
     with pytest.raises(ContractError, match=r"derivatives\(\) returned .*2 numbers"):
