@@ -100,8 +100,9 @@ def made_at_once() -> Iterator[None]:
 
 
 def _wait(widget: widgets.Widget) -> None:
-    is_mine = _waiting is not None and get_ident() == _thread
-    if is_mine and widget.comm is None and widget._model_id is None:
+    if _waiting is None or get_ident() != _thread:
+        return
+    if widget.comm is None and widget._model_id is None:
         widget.comm = _Waiting()
         _waiting[id(widget)] = widget
 
