@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import copy
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from rds.core.blame import student_error
 from rds.core.errors import ContractError
+
+_MOST = 100_000  # values of a state that are looked at
+_PARTS: dict[type, Callable[[Any], Iterable[Any]]] = {
+    list: list.__iter__,
+    tuple: tuple.__iter__,
+    deque: deque.__iter__,
+    dict: dict.values,
+}
 
 
 def shown(value: Any, length: int = 80) -> str:
@@ -34,14 +43,29 @@ def own_copy(value: Any, what: str, where: str | None = None) -> Any:
         raise ContractError(said, where) from error
 
 
-def has_nan(value: Any, depth: int = 0) -> bool:
-    """Whether any number in it is NaN, as far as it consists of lists, tuples, dicts and arrays."""
-    if isinstance(value, np.ndarray):
-        return value.dtype.kind in "fc" and bool(np.isnan(value).any())
-    if isinstance(value, float | np.floating):
-        return bool(value != value)
-    if depth > 40:
-        return False
-    if isinstance(value, Mapping):
-        return any(has_nan(part, depth + 1) for part in value.values())
-    return isinstance(value, list | tuple | deque) and any(has_nan(part, depth + 1) for part in value)
+def has_nan(value: Any) -> bool:
+    """Whether any number in it is NaN, as far as it consists of lists, tuples, dicts and arrays.
+
+    Each of them is looked through once, and by Python's own methods: it may hold itself, or be of a class whose methods
+    fail. Beyond `_MOST` values it is not looked through.
+    """
+    left: deque[Any] = deque([value])
+    seen: set[int] = set()
+    for _ in range(_MOST):
+        if not left:
+            break
+        each = left.popleft()
+        kind = type(each)
+        if issubclass(kind, np.ndarray):
+            if each.dtype.kind in "fc" and bool(np.isnan(each).any()):
+                return True
+        elif issubclass(kind, float):
+            if float.__ne__(each, each):
+                return True
+        elif issubclass(kind, np.floating):
+            if each != each:
+                return True
+        elif id(each) not in seen and (parts := next((_PARTS[own] for own in kind.__mro__ if own in _PARTS), None)):
+            seen.add(id(each))
+            left.extend(islice(parts(each), _MOST))
+    return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -245,6 +246,27 @@ def test_a_state_that_became_nan_behind_a_finite_voltage_is_told(coupled: bool, 
     (note,) = notes(0.0)
     assert note.startswith(f"the state of the controller of {owner} holds NaN at the end of the run")
     assert notes(np.nan) == []  # it is meant so
+
+
+@pytest.mark.parametrize("kind", ["holds itself", "names the two before", "fails to show its values"])
+def test_looking_for_nan_in_a_state_takes_no_time_and_does_not_fail(kind: str) -> None:
+    class Failing(dict[str, Any]):
+        def values(self) -> Any:
+            raise RuntimeError("no")
+
+    def law(t: float, r: Any, y: Any, state: Any, params: Any) -> Any:
+        if kind == "holds itself":
+            following: Any = [1.0]
+            following += [following, following]
+        elif kind == "names the two before":
+            following = {"last": state, "before": state and state["last"]}
+        else:
+            following = Failing(last=1.0)
+        return 0.0, following
+
+    begun = time.monotonic()
+    assert rds.Experiment(**(GOOD | {"controller": rds.Controller(law)})).run().meta["notes"] == []
+    assert time.monotonic() - begun < 10.0  # by way of each path to a value it takes years
 
 
 @pytest.mark.parametrize("law", ["tracking", "feedforward", "zero-phase"])

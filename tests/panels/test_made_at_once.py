@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -113,3 +114,23 @@ def test_what_ends_takes_no_shared_layout_along(said: list[tuple[str, str, Any]]
         third = widgets.HTML("4")
     assert third.layout.model_id == shared
     page_of(said)
+
+
+def test_a_layout_that_the_user_gives_to_another_widget_too_changes_both(said: list[tuple[str, str, Any]]) -> None:
+    with made_at_once():
+        owner = widgets.HTML("1")
+    also = widgets.HTML("2", layout=owner.layout)
+    owner.layout.width = "3px"
+    page = page_of(said)
+    looks = {page[each.model_id]["layout"].removeprefix("IPY_MODEL_") for each in (owner, also)}
+    assert [page[look]["width"] for look in looks] == ["3px"]
+
+
+def test_what_another_thread_makes_meanwhile_is_told_as_always(said: list[tuple[str, str, Any]]) -> None:
+    with made_at_once():
+        widgets.HTML("waits")
+        other = threading.Thread(target=widgets.HTML, args=("does not",))
+        other.start()
+        other.join()
+        assert [data["state"].get("value") for _, _, data in said][-1] == "does not"
+    assert [data["state"].get("value") for _, _, data in said][-1] == "waits"

@@ -15,6 +15,7 @@ import os
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
@@ -55,6 +56,7 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
     report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
     stolen = stolen_ticks()
     drivers = loop = watch = stopwatch = None
+    notes: Callable[[], list[str]] = list
     counted: dict[str, int] = {}  # by the drivers before the first sample
     bus = dict(plan.bus)
     faults, dialect = bus.pop("faults", ()), bus.pop("dialect", DEFAULT)
@@ -92,7 +94,7 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
                 report["ending"] = loop.run()
             finally:
                 stopwatch.end_copy()
-        report |= {"reason": loop.changes.reason, "notes": loop.notes()}
+        report["reason"], notes = loop.changes.reason, loop.notes
         if report["ending"] is Ending.DONE:
             drivers.confirm()
     except _Stopped as stopped:
@@ -120,6 +122,7 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
     after = stolen_ticks()
     environment["stolen_ticks"] = after - stolen if after is not None and stolen is not None else None
     report["samples"] = ring.head
+    report["notes"] = notes()  # they may take their time now that the axes have no power
     return report
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import get_ident
 from typing import Any
 from uuid import uuid4
 from weakref import ref
@@ -47,19 +48,21 @@ class _Shared:
 
     kernel = True
 
-    def __init__(self, mine: widgets.Widget, owner: widgets.Widget, name: str, shared: widgets.Widget) -> None:
-        self._mine, self._owner, self._name, self._shared = ref(mine), ref(owner), name, shared
+    def __init__(self, mine: widgets.Widget, shared: widgets.Widget) -> None:
+        self._mine, self._shared = ref(mine), shared
         self.comm_id = shared.model_id
 
     def send(self, data: Any, buffers: Any = None) -> None:
         """It was changed: from here on it has a channel of its own."""
-        mine, owner = self._mine(), self._owner()
+        mine = self._mine()
         if mine is None:
             return
         mine.comm = mine._model_id = None
         mine.open()
-        if owner is not None and getattr(owner, self._name) is mine:
-            owner.send_state(self._name)
+        for owner in list(_instances.values()):  # a user may have given it to another widget too
+            for name in _LOOKS:
+                if owner._trait_values.get(name) is mine:
+                    owner.send_state(name)
 
     def on_msg(self, heard: Callable[..., Any]) -> None:
         """The page says nothing to a layout or style."""
@@ -71,16 +74,17 @@ class _Shared:
 
 _ORIGINALS: dict[type, widgets.Widget] = {}  # of each kind of layout and style, the one that is shared
 _waiting: dict[int, widgets.Widget] | None = None  # those that are being made, by their id()
+_thread = 0  # which makes them: what another one makes beside it is told as always
 
 
 @contextmanager
 def made_at_once() -> Iterator[None]:
     """Within it no message is sent for the widgets that are made; at its end one for each, and for what it shows."""
-    global _waiting
+    global _waiting, _thread
     if _waiting is not None or not _IS_KNOWN:
         yield
         return
-    _waiting, before = {}, widgets.Widget._widget_construction_callback
+    _waiting, _thread, before = {}, get_ident(), widgets.Widget._widget_construction_callback
     widgets.Widget.on_widget_constructed(_wait)
     try:
         yield
@@ -96,7 +100,9 @@ def made_at_once() -> Iterator[None]:
 
 
 def _wait(widget: widgets.Widget) -> None:
-    if widget.comm is None and widget._model_id is None and _waiting is not None:
+    if _waiting is None or get_ident() != _thread:
+        return
+    if widget.comm is None and widget._model_id is None:
         widget.comm = _Waiting()
         _waiting[id(widget)] = widget
 
@@ -108,7 +114,7 @@ def _open(widget: widgets.Widget) -> None:
         return  # told already, or closed
     for name in widget.keys:
         value = getattr(widget, name)
-        if name in _LOOKS and isinstance(value, widgets.Widget) and _share(value, widget, name):
+        if name in _LOOKS and isinstance(value, widgets.Widget) and _share(value):
             continue
         for named in _named(value):
             _open(named)
@@ -128,7 +134,7 @@ def _named(value: Any) -> Iterator[widgets.Widget]:
         yield from _named(list(value.values()))
 
 
-def _share(look: widgets.Widget, owner: widgets.Widget, name: str) -> bool:
+def _share(look: widgets.Widget) -> bool:
     """Whether a layout or style that the page has not heard of is as all are that nobody has changed."""
     assert _waiting is not None
     if id(look) not in _waiting:
@@ -141,7 +147,7 @@ def _share(look: widgets.Widget, owner: widgets.Widget, name: str) -> bool:
         return False
     del _waiting[id(look)]
     _instances.pop(look.model_id, None)
-    look.comm = _Shared(look, owner, name, original)
+    look.comm = _Shared(look, original)
     _remember(original)
     return True
 
