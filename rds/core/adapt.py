@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.errors import InputError
+from rds.core.errors import ContractError, InputError
 from rds.core.integrate import rk4
 from rds.core.timed_motion import TimedMotion
 from rds.core.types import Controller, Model, Reference, Source
+from rds.core.values import shown
 
 _SAME = 1e-9
 Rows = tuple[tuple[float, ...], ...]
@@ -246,6 +247,9 @@ def _moved(
 ) -> tuple[float, ...]:
     def update(t: float, x: Any, u: np.ndarray, params: Any) -> list[float]:
         answer: list[float] = np.asarray(sys.dynamics(t, np.array(x), u, params=params), dtype=float).ravel().tolist()
+        if len(answer) != len(x):
+            said = f"the update function of {sys.name} returned {shown(answer)}, which is no change of its state"
+            raise ContractError(f"{said}; it must return {len(x)} numbers, one for each state")
         return answer
 
     if x.size == 0:

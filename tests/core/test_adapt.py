@@ -13,7 +13,7 @@ import pytest
 import rds
 from rds.controllers.design import tracking_controller_system
 from rds.core.adapt import as_controller, as_model, is_control_system
-from rds.core.errors import InputError
+from rds.core.errors import ContractError, InputError
 from rds.core.types import Controller, Model, Reference
 
 T = 1e-3
@@ -108,6 +108,17 @@ def test_linear_model_is_exact_for_a_held_voltage():
     t = np.arange(200) * T
     expected = K * 3.0 * (t - TAU * (1 - np.exp(-t / TAU)))
     np.testing.assert_allclose(respond(model, [3.0] * 200), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("answer", [[1.0], [1.0, 2.0, 3.0], 3.0])
+@pytest.mark.parametrize("dt", [0, T])
+def test_an_update_that_does_not_answer_for_each_state_is_refused(answer, dt):
+    system = control.nlsys(
+        lambda t, x, u, params: answer, lambda t, x, u, params: x[0], inputs=1, outputs=1, states=2, dt=dt, name="axle"
+    )
+    model = as_model(system, T)
+    with pytest.raises(ContractError, match=r"of axle returned .*; it must return 2 numbers, one for each"):
+        model.advance((0.0, 0.0), 1.0, T, model.params)
 
 
 def test_nonlinear_and_interconnected_models_are_integrated():

@@ -22,7 +22,7 @@ def test_threads_that_pack_at_the_same_time_do_not_disturb_each_other(tmp_path: 
     sys.setswitchinterval(1e-6)
     try:
         with ThreadPoolExecutor(4) as threads:
-            packed = list(threads.map(lambda _: portable(student), range(100)))
+            packed = list(threads.map(lambda _: portable(student), range(400)))
     finally:
         sys.setswitchinterval(before)
     assert len(set(packed)) == 1

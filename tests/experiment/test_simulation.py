@@ -277,6 +277,13 @@ def test_a_loop_that_a_bus_makes_unstable_is_refused_before_the_run(law: str, al
         rds.Experiment(**slow, mode="implementation").run()
 
 
+def test_a_law_that_gives_way_to_a_drive_is_not_refused_for_the_delay_of_a_bus() -> None:
+    bus = {"dialect": "cia402", "cia402": {"mode": "csp"}}
+    words = {"controller": "tracking", "sample_period": 0.05, "reference": {"kind": "constant", "value": 0.0}}
+    (axis,) = rds.Experiment(**GOOD | words, bus=bus).plan("implementation").axes
+    assert axis.controller is not None and axis.controller.source.name == "the drive's position loop"
+
+
 def test_the_delay_of_a_bus_as_the_loop_of_the_law_has_it() -> None:
     """The network between model and law delays by one sample, as a bus does: stable at 0.03 s, not at 0.04 s."""
     for T in (0.03, 0.04):

@@ -96,6 +96,10 @@ from tests.grading.test_submissions_notebooks import made
         'k = 1.0\n_ = [k := v for v in (2.0, 30.0)]\nparams["Kp"] = k',
         # what is called as a reader of files, and is none
         'def load(kind):\n    return {"axis": 30.0}[kind]\nparams["Kp"] = load("axis")',
+        'class Gains:\n    def load(self, kind):\n        return {"axis": 30.0}[kind]\nkind = "axis"\nparams["Kp"] = Gains().load(kind)',
+        'def best(kind, path=None):\n    return float(open(path).read()) if path else {"fast": 30.0}[kind]\nparams["Kp"] = best("fast")',
+        'def kept(path, k):\n    with open(path, "w") as file:\n        file.write(str(k))\n    return k\nparams["Kp"] = kept("/dev/null", 30.0)',
+        'def get(path):\n    try:\n        return float(open(path).read())\n    except OSError:\n        return 30.0\nparams["Kp"] = get("no-such.txt")',
         'import io\nimport numpy as np\nparams["Kp"] = float(np.loadtxt(io.StringIO("30.0")))',
         'import io\nimport numpy as np\ntext = io.StringIO("30.0")\nparams["Kp"] = float(np.loadtxt(text))',
         'k = 1.0\nif True:\n    def tune():\n        global k\n        k = 30.0\n    tune()\nparams["Kp"] = k',

@@ -289,6 +289,14 @@ def test_a_wire_that_opens_and_closes_again_is_not_taken_for_the_zero(bench: Ben
     assert not rig.module.mover.homed and plant.counts / 169.0 == pytest.approx(plant.true_position, abs=0.02)
 
 
+@pytest.mark.parametrize("start", [-145.0, -145.37, -146.21])
+def test_a_switch_is_its_own_edge_at_many_counts_a_step(bench: Benches, start: float) -> None:
+    """Of 25 counts in each ms, as other machines' modules count them, an edge may be noted a ms late, both ways."""
+    rig = bench("X", start=start, counts_per_unit=16900.0)
+    rig.move(Move.HOME)
+    assert rig.until_done() == Result.CARRIED_OUT and rig.module.mover.homed
+
+
 def test_a_homing_that_is_stopped_while_it_leaves_the_switch_leaves_the_zero_alone(bench: Benches) -> None:
     rig = bench("X", start=-100.0)
     rig.move(Move.HOME)

@@ -23,6 +23,7 @@ class Files:
     readers: Set[str] = _READERS
     names: Set[str] = field(default_factory=frozenset)
     own: Set[str] = field(default_factory=frozenset)  # the notebook's own functions that are called as a reader is
+    methods: Set[str] = field(default_factory=frozenset)  # those of its classes that are
 
     @classmethod
     def of(cls, body: Sequence[ast.stmt]) -> Files:
@@ -30,10 +31,11 @@ class Files:
         functions = {each.name: each for each in body if isinstance(each, followed.FUNCTIONS)}
         readers, own = set(_READERS), set(functions) & _READERS
         for name, function in functions.items():
-            arguments = {node.arg for node in ast.walk(function.args) if isinstance(node, ast.arg)}
-            if any(_name_of(call) in arguments for call in _calls(function) if last_word(call.func) in _READERS):
+            if _reads_its_first(function):
                 readers.add(name)
                 own.discard(name)
+        classes = (each for each in body if isinstance(each, ast.ClassDef))
+        methods = {node.name for each in classes for node in each.body if isinstance(node, followed.FUNCTIONS)}
         values: dict[str, list[ast.AST | None]] = {}
         for node in chain.from_iterable(map(ast.walk, chain.from_iterable(map(at_once, body)))):
             targets, value = bound(node)
@@ -51,7 +53,7 @@ class Files:
             for name, given in values.items()
             if any(isinstance(each, ast.Attribute | ast.Name) and last_word(each) in _READERS for each in given)
         }
-        return cls(readers, names, own)
+        return cls(readers, names, own, methods & _READERS)
 
     def read_by(self, statement: ast.stmt) -> bool:
         """Whether a statement cannot do without a file that it names."""
@@ -63,17 +65,26 @@ class Files:
         function, word = call.func, last_word(call.func)
         if isinstance(function, ast.Attribute) and word in _OF_PATHS and _is_name(function.value, self.names):
             return not _writes(call.args[:1], call.keywords)
-        if word not in self.readers or (isinstance(function, ast.Name) and word in self.own) or not call.args:
+        if word not in self.readers or word in (self.own if isinstance(function, ast.Name) else self.methods):
             return False
-        return _is_name(call.args[0], self.names) and not (word == "open" and _writes(call.args[1:2], call.keywords))
+        return bool(call.args) and _is_name(call.args[0], self.names) and not _opens_to_write(call)
 
 
 def _calls(tree: ast.AST) -> list[ast.Call]:
     return [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
 
 
-def _name_of(call: ast.Call) -> str:
-    return call.args[0].id if call.args and isinstance(call.args[0], ast.Name) else ""
+def _reads_its_first(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """Whether a function cannot do without the file that its first argument names."""
+    arguments = [*function.args.posonlyargs, *function.args.args]
+    ways_out = (node for node in ast.walk(function) if isinstance(node, ast.Try | ast.If))
+    optional = {call for each in ways_out for call in _calls(each)}
+    return any(
+        isinstance(given, ast.Name) and given.id == arguments[0].arg and not _opens_to_write(call)
+        for call in _calls(function)
+        if arguments and call not in optional and last_word(call.func) in _READERS
+        for given in call.args[:1]
+    )
 
 
 def _is_name(value: ast.AST | None, names: Set[str]) -> bool:
@@ -85,6 +96,10 @@ def _is_name(value: ast.AST | None, names: Set[str]) -> bool:
     if isinstance(value, ast.Name):
         return value.id in names
     return isinstance(value, ast.JoinedStr) or (isinstance(value, ast.Constant) and isinstance(value.value, str))
+
+
+def _opens_to_write(call: ast.Call) -> bool:
+    return last_word(call.func) == "open" and _writes(call.args[1:2], call.keywords)
 
 
 def _writes(mode: Sequence[ast.expr], keywords: Sequence[ast.keyword]) -> bool:

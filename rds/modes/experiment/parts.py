@@ -34,7 +34,7 @@ class Setting:
     """What parts are made for: the axis, its sample period in s, the user's folder, and what the axis is commanded by.
 
     `limit` is the largest command: the converter's range in V, or `top_speed` (unit/s) for a drive's velocity loop.
-    `on_bus` says that a command acts one sample later than in a simulation.
+    `on_bus` says that its command acts one sample later than in a simulation.
     """
 
     axis: Axis

@@ -78,7 +78,8 @@ def resolve(
         command = commands[axis.name]
         speed = top_speed(axis, machine)
         most = limit if command is Command.VOLTAGE else speed if saturation else inf
-        setting = Setting(axis, T, most, folder, command, speed, on_bus=mode.drivers == "live")
+        on_bus = mode.drivers == "live" and not gives_way(axis, command)
+        setting = Setting(axis, T, most, folder, command, speed, on_bus)
         made, periods[axis.name], note = _axis_plan(own, setting, driven, samples)
         axes.append(made)
         notes += [note] if note else []

@@ -12,14 +12,15 @@ from math import inf
 from rds.bus.modules.oacs import pid
 from rds.bus.modules.oacs.codes import DUTY, Acknowledges, Mode, Result
 from rds.bus.modules.oacs.pid import Tuning
-from rds.bus.modules.oacs.plant import Plant
+from rds.bus.modules.oacs.plant import STEP, Plant
 
 STALL = 3.0  # s without a count until the motion is given up
 STILL = 0.1  # s without a count until the axis counts as standing
 HOST_SILENCE = 2.0  # s without a word of the host until the motion ends
 HOMING_DUTY = 200.0
 LEAVES = 0.05  # of the travel: off a limit switch within this way, or its wire is broken
-SAME_EDGE = 8  # counts: a limit switch closes where it opened, a wire anywhere
+SAME_EDGE = 8  # counts, and the way of SAME_TIME: a limit switch closes where it opened, a wire anywhere
+SAME_TIME = 3.0 * STEP  # s: both edges are noted at the end of a step
 LONGEST_JOG = 60.0  # s
 _TOOL_STILL = 0.5  # rev/min
 _AT_START = pid.Memory()
@@ -223,7 +224,8 @@ class Mover:
                 self._settle(Result.STOPPED_BY_LIMIT, now)
         elif motion.direction > 0:
             edge = round(low.position * plant.data.counts_per_unit)
-            if motion.found and abs(low.mark - edge) > SAME_EDGE:  # what opened and closed was a wire
+            near = SAME_EDGE + SAME_TIME * abs(plant.velocity) * plant.data.counts_per_unit
+            if motion.found and abs(low.mark - edge) > near:  # what opened and closed was a wire
                 self._settle(Result.STOPPED_BY_LIMIT, now)
             elif motion.found:
                 self.homed = True
