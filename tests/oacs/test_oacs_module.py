@@ -289,6 +289,15 @@ def test_a_wire_that_opens_and_closes_again_is_not_taken_for_the_zero(bench: Ben
     assert not rig.module.mover.homed and plant.counts / 169.0 == pytest.approx(plant.true_position, abs=0.02)
 
 
+def test_a_homing_ends_where_its_switch_never_opens(bench: Benches) -> None:
+    rig = bench("X", start=-100.0)
+    rig.module.set_wire(-1, True, rig.now)
+    rig.move(Move.HOME)
+    assert rig.until_done() == Result.STOPPED_BY_LIMIT
+    data = rig.module.plant.data
+    assert -100.0 - rig.module.plant.true_position < 1.25 * (data.highest - data.lowest) and not rig.module.mover.homed
+
+
 @pytest.mark.parametrize("start", [-145.0, -145.37, -146.21])
 def test_a_switch_is_its_own_edge_at_many_counts_a_step(bench: Benches, start: float) -> None:
     """Of 25 counts in each ms, as other machines' modules count them, an edge may be noted a ms late, both ways."""

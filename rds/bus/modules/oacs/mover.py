@@ -19,6 +19,7 @@ STILL = 0.1  # s without a count until the axis counts as standing
 HOST_SILENCE = 2.0  # s without a word of the host until the motion ends
 HOMING_DUTY = 200.0
 LEAVES = 0.05  # of the travel: off a limit switch within this way, or its wire is broken
+FARTHEST = 1.2  # of the travel: a switch that a homing has not found within this way does not open
 SAME_EDGE = 8  # counts, and the way of SAME_TIME: a limit switch closes where it opened, a wire anywhere
 SAME_TIME = 3.0 * STEP  # s: both edges are noted at the end of a step
 LONGEST_JOG = 60.0  # s
@@ -208,6 +209,7 @@ class Mover:
     def _step_home(self, motion: Motion, now: float) -> None:
         plant = self.plant
         low, high = plant.switches
+        travel = (plant.data.highest - plant.data.lowest) * plant.data.counts_per_unit
         if high.open or now - motion.last_change > STALL:
             self._settle(Result.STOPPED_BY_LIMIT if high.open else Result.STALLED, now)
         elif motion.direction < 0 and low.open:
@@ -218,11 +220,13 @@ class Mover:
             motion.direction = 1
             motion.last_change = now
             plant.drive(motion.duty, now)
-        elif motion.direction > 0 and low.open:
-            way = LEAVES * (plant.data.highest - plant.data.lowest) * plant.data.counts_per_unit
-            if plant.counts - motion.turned > way:  # what opened was a wire: the zero is not here
+        elif motion.direction < 0:
+            if motion.turned - plant.counts > FARTHEST * travel:
                 self._settle(Result.STOPPED_BY_LIMIT, now)
-        elif motion.direction > 0:
+        elif low.open:
+            if plant.counts - motion.turned > LEAVES * travel:  # what opened was a wire: the zero is not here
+                self._settle(Result.STOPPED_BY_LIMIT, now)
+        else:
             edge = round(low.position * plant.data.counts_per_unit)
             near = SAME_EDGE + SAME_TIME * abs(plant.velocity) * plant.data.counts_per_unit
             if motion.found and abs(low.mark - edge) > near:  # what opened and closed was a wire

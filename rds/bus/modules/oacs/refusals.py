@@ -12,7 +12,9 @@ REASONS = {
     Result.NOT_FOR_THIS_MODULE: "a module of its kind cannot do that",
     Result.STALLED: "the axis did not move for 3 s; raise the gains or the output limit, or free the axis",
     Result.BUSY: "it is in motion; wait for its end, or stop it",
-    Result.STOPPED_BY_LIMIT: "a limit switch opened; home it or move it the other way, or check the switch's wire",
+    Result.STOPPED_BY_LIMIT: (
+        "a limit switch opened, or a homing found none; home it or move it the other way, or check the switch's wire"
+    ),
     Result.STOPPED_BY_EMERGENCY: "the emergency stop was pressed; release it, then reset it",
     Result.STOPPED_BY_COMMAND: "it was told to stop",
     Result.HOST_COMMANDS: "a run commands it cyclically; wait for its end",
