@@ -110,8 +110,8 @@ def residual_tests(
     block = block_length(frequency, T, len(residual))
     spread = _parameter_spread(sensitivities, covariance, use)
     e, u = block_means(residual - residual.mean(), block), block_means(command, block)
-    lags, u = min(LAGS, len(e) // 4), _transformed(u - u.mean() if len(u) else u)
-    r, c = _correlations(e, u, lags)
+    lags, driven = min(LAGS, len(e) // 4), _transformed(u - u.mean() if len(u) else u)
+    r, c = _correlations(e, driven, lags)
     q, largest = _portmanteau(r, len(e)), float(np.abs(c).max(initial=0.0))
     more_q = more_c = 0
     draw = np.random.default_rng(seed)
@@ -119,7 +119,7 @@ def residual_tests(
     for _ in range(_SURROGATES):
         surrogate = _surrogate(modelled, noise, resolution, spread, draw)
         s = block_means(surrogate - surrogate.mean(), block)
-        of_itself, of_command = _correlations(s, u, lags)
+        of_itself, of_command = _correlations(s, driven, lags)
         more_q += _portmanteau(of_itself, len(s)) >= q
         more_c += float(np.abs(of_command).max(initial=0.0)) >= largest
     step = block * T
