@@ -42,11 +42,13 @@ def compile_fast_lane() -> None:
 
 
 def compile_fits() -> None:
-    """Fit two of the logs that come with the package."""
+    """Fit two of the logs that come with the package, and validate a model on one."""
     import rds
 
     for name, structure in (("mini-cnc-X-steps", "axis"), ("mini-cnc-spindle-steps", "spindle")):
         rds.fit(rds.read_log(rds.shipped_log(name)), structure)
+    axis = rds.library_model("linear-axis", tau=0.01, K=1.8, friction_plus=0.5, friction_minus=-0.5)
+    rds.validate(axis, rds.read_log(rds.shipped_log("mini-cnc-X-steps")))
 
 
 def compile_planner() -> None:

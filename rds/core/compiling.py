@@ -87,7 +87,10 @@ class TieredKernel:
         self._look()
 
     def __call__(self, *values: Any, **named: Any) -> Any:
-        of, now = TieredKernel, thread_time()
+        of = TieredKernel
+        if of.spent >= self.enough and (self.is_kept or of.told):
+            return self.compiled(*values, **named)  # most calls of a long program, without a look at the clock
+        now = thread_time()
         since = of.within.since
         spent = of.spent + (now - since if since else 0.0)
         if not self.is_kept and LOADED <= spent < LONG:

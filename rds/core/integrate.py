@@ -29,6 +29,8 @@ def rk4(
     `derivatives(t, x, u, params)` gets the state as numbers, and returns as many, in a sequence of its own. Over a
     given time the error falls with the fourth power of the step.
     """
+    if len(x) == 2:  # position and velocity, as most models have
+        return _rk4_of_two(derivatives, t, x, u, T, params, substeps)
     h, x, each = T / substeps, list(x), range(len(x))  # numbers: numpy takes twice as long for a few states
     half, sixth = 0.5 * h, h / 6.0
     for i in range(substeps):
@@ -39,6 +41,30 @@ def rk4(
         k4 = derivatives(now + h, [x[n] + h * k3[n] for n in each], u, params)
         x = [x[n] + sixth * (k1[n] + 2.0 * (k2[n] + k3[n]) + k4[n]) for n in each]
     return x
+
+
+def _rk4_of_two(
+    derivatives: Callable[..., Sequence[float]],
+    t: float,
+    x: Sequence[float],
+    u: Any,
+    T: float,
+    params: Any,
+    substeps: int,
+) -> list[float]:
+    """The same of two states, to the bit, in less time."""
+    h = T / substeps
+    half, sixth = 0.5 * h, h / 6.0
+    y, v = x
+    for i in range(substeps):
+        now = t + i * h
+        k1 = derivatives(now, [y, v], u, params)
+        k2 = derivatives(now + half, [y + half * k1[0], v + half * k1[1]], u, params)
+        k3 = derivatives(now + half, [y + half * k2[0], v + half * k2[1]], u, params)
+        k4 = derivatives(now + h, [y + h * k3[0], v + h * k3[1]], u, params)
+        y = y + sixth * (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0])
+        v = v + sixth * (k1[1] + 2.0 * (k2[1] + k3[1]) + k4[1])
+    return [y, v]
 
 
 def gramian(A: np.ndarray, Q: np.ndarray, time: float) -> np.ndarray:

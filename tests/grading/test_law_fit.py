@@ -325,7 +325,7 @@ def control(t, r, y, state, params):
 @pytest.mark.parametrize("plant", ["", 'plant = "machine"'])
 @pytest.mark.parametrize("name", UNLIKE_ANY)
 def test_no_honest_law_is_called_unstable_by_a_law_that_is_only_near_it(name: str, plant: str, tmp_path: Path) -> None:
-    for seed in range(1, 9):
+    for seed in (2, 3, 6, 7):  # the nearest law alone would be called unstable with one or more
         found = loop_of(tmp_path, UNLIKE_ANY[name], seed, plant, moving=True)
         assert found.margins[1] > 45.0 if isinstance(found, LinearLoop) else not found.is_known, (seed, found)
 

@@ -183,8 +183,8 @@ def test_the_names_of_many_runs_have_room_above_them() -> None:
 
 
 def test_pictures_are_drawn_in_any_thread_and_show_themselves(result: Result) -> None:
-    with ThreadPoolExecutor(4) as pool:
-        pictures = list(pool.map(lambda _: result.plot()._repr_png_(), range(4)))
+    with ThreadPoolExecutor(2) as pool:
+        pictures = list(pool.map(lambda _: result.plot()._repr_png_(), range(2)))
     assert len(set(pictures)) == 1
     assert pictures[0].startswith(b"\x89PNG")
 

@@ -11,6 +11,7 @@ a hundred logs, however coarse the encoder.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -109,8 +110,8 @@ def residual_tests(
     block = block_length(frequency, T, len(residual))
     spread = _parameter_spread(sensitivities, covariance, use)
     e, u = block_means(residual - residual.mean(), block), block_means(command, block)
-    lags = min(LAGS, len(e) // 4)
-    r, c = _auto(e, lags), _cross(e, u, lags)
+    lags, driven = min(LAGS, len(e) // 4), _transformed(u - u.mean() if len(u) else u)
+    r, c = _correlations(e, driven, lags)
     q, largest = _portmanteau(r, len(e)), float(np.abs(c).max(initial=0.0))
     more_q = more_c = 0
     draw = np.random.default_rng(seed)
@@ -118,8 +119,9 @@ def residual_tests(
     for _ in range(_SURROGATES):
         surrogate = _surrogate(modelled, noise, resolution, spread, draw)
         s = block_means(surrogate - surrogate.mean(), block)
-        more_q += _portmanteau(_auto(s, lags), len(s)) >= q
-        more_c += float(np.abs(_cross(s, u, lags)).max(initial=0.0)) >= largest
+        of_itself, of_command = _correlations(s, driven, lags)
+        more_q += _portmanteau(of_itself, len(s)) >= q
+        more_c += float(np.abs(of_command).max(initial=0.0)) >= largest
     step = block * T
     band = BAND / np.sqrt(max(len(e), 1))
     return ResidualTest(
@@ -181,28 +183,38 @@ def _surrogate(
     return true - modelled
 
 
-def _auto(e: np.ndarray, lags: int) -> np.ndarray:
-    """Autocorrelation at lags 1 to `lags`; zeros for a residual that is constant."""
-    size = float(np.sum(e**2))
-    if not size > 0.0:
-        return np.zeros(lags)
-    return _products(e, e)[1 : lags + 1] / size
+def _correlations(e: np.ndarray, u: _Transformed, lags: int) -> tuple[np.ndarray, np.ndarray]:
+    """Autocorrelation at lags 1 to `lags`, and the correlation with the command `lag` blocks before, from -lags to
+    lags; zeros for a residual or a command that is constant.
+    """
+    auto, cross = np.zeros(lags), np.zeros(2 * lags + 1)
+    own = _transformed(e)
+    if own.power > 0.0:
+        auto = own.products(own)[1 : lags + 1] / own.power
+    size = float(np.sqrt(own.power * u.power))
+    if size > 0.0:
+        products = own.products(u)
+        cross = np.concatenate([products[len(products) - lags :], products[: lags + 1]]) / size
+    return auto, cross
 
 
-def _cross(e: np.ndarray, u: np.ndarray, lags: int) -> np.ndarray:
-    """Correlation of the residual with the command `lag` blocks before it, from -lags to lags."""
-    u = u - u.mean() if len(u) else u
-    size = float(np.sqrt(np.sum(e**2) * np.sum(u**2)))
-    if not size > 0.0:
-        return np.zeros(2 * lags + 1)
-    products = _products(e, u)
-    return np.concatenate([products[len(products) - lags :], products[: lags + 1]]) / size
+class _Transformed(NamedTuple):
+    """Values as their Fourier transform, padded by zeros to `size`, and the sum of their squares."""
+
+    transform: np.ndarray
+    conjugate: np.ndarray
+    size: int
+    power: float
+
+    def products(self, other: _Transformed) -> np.ndarray:
+        """The sums over k of a[k + lag] b[k], at index `lag`; negative lags count from the end."""
+        return np.fft.irfft(self.transform * other.conjugate, self.size)
 
 
-def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The sums over k of a[k + lag] b[k], at index `lag`; negative lags count from the end."""
-    size = 2 ** int(2 * len(a) - 1).bit_length()
-    return np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
+def _transformed(values: np.ndarray) -> _Transformed:
+    size = 2 ** int(2 * len(values) - 1).bit_length()
+    transform = np.fft.rfft(values, size)
+    return _Transformed(transform, np.conj(transform), size, float(np.sum(values**2)))
 
 
 def _portmanteau(r: np.ndarray, n: int) -> float:
