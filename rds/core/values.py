@@ -24,11 +24,25 @@ _PARTS: dict[type, Callable[[Any], Iterable[Any]]] = {
 
 def shown(value: Any, length: int = 80) -> str:
     """Its text, on one line and not longer than `length` characters."""
+    if _is_vast(value):
+        return f"a {type(value).__name__} that holds more than {_MOST} others"
     try:
         text = " ".join(repr(value).split())
     except Exception:  # a class of the student's may fail to print itself
         text = f"a {type(value).__name__}"
     return text if len(text) <= length else text[: length - 1] + "…"
+
+
+def _is_vast(value: Any) -> bool:
+    """Whether its text would be without end: of what holds a few parts that hold each other many times."""
+    left = [value]
+    for _ in range(_MOST):
+        if not left:
+            return False
+        each = left.pop()
+        if (parts := _PARTS.get(type(each))) is not None:
+            left.extend(part for part in parts(each) if type(part) in _PARTS)
+    return bool(left)
 
 
 def own_copy(value: Any, what: str, where: str | None = None) -> Any:

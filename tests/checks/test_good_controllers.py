@@ -289,6 +289,17 @@ def test_a_state_that_becomes_nan_behind_a_limit_is_worth_a_warning():
     assert not check_controller(lambda t, r, y, state, params: (0.0, [math.nan]), initial_state=[math.nan]).warnings
 
 
+@pytest.mark.parametrize("kind", [list, dict])
+def test_a_state_that_holds_itself_twice_is_gone_through_once(kind):
+    def control(t, r, y, state, params):
+        error = r.position - y
+        held = {0: error} if kind is dict else [error, None, None]
+        held[1] = held[2] = held
+        return GAIN * error, held
+
+    assert check_controller(control, initial_state=[0.0, 0.0, 0.0]).ok
+
+
 def test_a_user_may_check_with_an_exact_period_of_another_size():
     report = check_controller(proportional, 0.01)
     assert report.ok

@@ -29,6 +29,14 @@ def test_what_cannot_be_shown_is_named_by_its_class() -> None:
     assert shown([1.0] * 100, 20) == "[1.0, 1.0, 1.0, 1.0…"
 
 
+def test_what_holds_itself_or_a_part_many_times_is_shown_in_no_time() -> None:
+    doubled: Any = (1.0, 2.0)
+    for _ in range(60):
+        doubled = (doubled, doubled)
+    assert shown(doubled) == "a tuple that holds more than 100000 others"
+    assert shown([(1, 2)] * 5000, 15) == "[(1, 2), (1, 2…"
+
+
 def test_what_cannot_be_copied_is_said_with_its_place() -> None:
     with pytest.raises(ContractError, match=r"law.py: params cannot be copied .*lock.*; keep numbers, lists"):
         own_copy({"key": threading.Lock()}, "params", "law.py")
