@@ -6,6 +6,8 @@ import gc
 import os
 import sys
 
+from rds.core.garbage import collect_rarely
+
 _ELSEWHERE = {"--help", "--container", "--scheduler"}  # with which `rds grade run` has no worker here
 _INTERRUPTED = 130  # the exit code of what Ctrl-C ended, by the shell's custom
 
@@ -23,6 +25,7 @@ def open_streams() -> None:
 def main() -> None:
     """Run the command line; Ctrl-C in the middle of an import is no traceback."""
     open_streams()
+    collect_rarely()
     try:
         if sys.argv[1:3] == ["nc", "canon"]:
             from rds.cli.canon import canon_alone

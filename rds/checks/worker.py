@@ -8,6 +8,11 @@ the interpreter down loses only what comes after: {"begin": interface}, {"report
 
 from __future__ import annotations
 
+if __name__ == "__main__":  # a program of our own
+    from rds.core.garbage import collect_rarely
+
+    collect_rarely()
+
 import contextlib
 import faulthandler
 import json

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from waiting import wait_for
 
+from rds.machines import load_machine
 from rds.results import open_result
 
-from .conftest import Bench
+from .conftest import Bench, expect
 
 pytestmark = pytest.mark.realtime
 
@@ -24,11 +25,30 @@ LINE = 2  # of the program: it lasts
 ONE = pytest.mark.parametrize("bench", ["rds"], indirect=True)  # what modules do by themselves: in the other files
 
 
+def serve(bench: Bench, folder: Path) -> subprocess.Popen[str]:
+    """A machine of axis X alone: a run draws each axis that there is."""
+    machine = Path(load_machine("mini-cnc").path).read_text().partition("[axis.Y]")[0]
+    (folder / "machine.toml").write_text(machine)
+    words = [str(folder / "machine.toml"), "--channel", bench.channel]
+    process = bench.start("-m", "rds.bus.modules.rds.server", *words)
+    expect(process, "ready")
+    return process
+
+
 def start(bench: Bench, folder: Path) -> subprocess.Popen[str]:
     """A run of a program that moves X for half a minute, once it does."""
     (folder / "part.ngc").write_text("G21 G90\nG1 X60 F120\nM2\n")
     (folder / "bus.toml").write_text(f'[bus]\nchannel = "{bench.channel}"\n')
-    words = ["--mode", "implementation", "--controller", str(folder / "bus.toml"), "--out", str(folder / "out")]
+    machine = ["--machine", str(folder / "machine.toml")]
+    words = [
+        *machine,
+        "--mode",
+        "implementation",
+        "--controller",
+        str(folder / "bus.toml"),
+        "--out",
+        str(folder / "out"),
+    ]
     run = bench.start("-m", "rds.cli.main", "nc", "run", str(folder / "part.ngc"), *words)
     bench.wait_until_moving(run, 60.0)  # it is checked and planned first
     return run
@@ -37,7 +57,7 @@ def start(bench: Bench, folder: Path) -> subprocess.Popen[str]:
 @ONE
 def test_a_host_that_dies_with_all_its_processes(bench: Bench, tmp_path: Path) -> None:
     """As if its computer had lost its power: nobody is left to stop the axes but their modules."""
-    bench.serve("X,Y,Z,spindle")
+    serve(bench, tmp_path)
     run = start(bench, tmp_path)
     wait_for(lambda: (tmp_path / "out" / "record.rds").exists() and bench.powered())
     processes = json.loads((tmp_path / "out" / "processes.json").read_text())
@@ -58,7 +78,7 @@ def test_a_host_that_dies_with_all_its_processes(bench: Bench, tmp_path: Path) -
 
 @ONE
 def test_a_machine_that_dies(bench: Bench, tmp_path: Path) -> None:
-    server = bench.serve("X,Y,Z,spindle")
+    server = serve(bench, tmp_path)
     run = start(bench, tmp_path)
     server.kill()
     _, said = run.communicate(timeout=60)

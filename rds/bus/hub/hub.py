@@ -6,6 +6,11 @@ left. By hand, in the foreground, for other limits or to watch its log: `python 
 
 from __future__ import annotations
 
+if __name__ == "__main__":  # a program of our own
+    from rds.core.garbage import collect_rarely
+
+    collect_rarely()
+
 import argparse
 import gc
 import os
@@ -18,6 +23,7 @@ from types import FrameType
 from rds.bus.hub.address import Address
 from rds.bus.hub.hub_loop import LINGER, QUEUE, STALL, Hub
 from rds.bus.hub.hub_nodes import log
+from rds.core.garbage import leave
 from rds.core.private_files import keep_process_private
 
 PRIORITY = 70  # below the target's 80, above the modules' 60
@@ -96,4 +102,4 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 if __name__ == "__main__":
     keep_process_private()
-    sys.exit(main())
+    leave(main())

@@ -6,6 +6,11 @@ once when who started it is killed: an item may take long, and nobody would read
 
 from __future__ import annotations
 
+if __name__ == "__main__":  # a program of our own
+    from rds.core.garbage import collect_rarely
+
+    collect_rarely()
+
 import os
 import pickle
 import sys

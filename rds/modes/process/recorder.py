@@ -8,6 +8,11 @@ died or hangs, and writes how the run ended. It belongs to no terminal: the host
 
 from __future__ import annotations
 
+if __name__ == "__main__":  # a program of our own
+    from rds.core.garbage import collect_rarely
+
+    collect_rarely()
+
 import contextlib
 import json
 import os
@@ -21,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.blame import is_installed
+from rds.core.garbage import leave
 from rds.core.private_files import keep_process_private, open_private, write_private
 from rds.core.types import Ending
 from rds.modes.loop.changes import FILE as CHANGES
@@ -239,4 +245,4 @@ def main(arguments: list[str]) -> int:
 
 if __name__ == "__main__":
     keep_process_private()
-    sys.exit(main(sys.argv[1:]))
+    leave(main(sys.argv[1:]))

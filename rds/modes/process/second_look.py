@@ -10,6 +10,11 @@ second look ends without an answer (see `forbid_effects`). So it does where it w
 
 from __future__ import annotations
 
+if __name__ == "__main__":  # a program of our own
+    from rds.core.garbage import collect_rarely
+
+    collect_rarely()
+
 import os
 import signal
 import subprocess

@@ -8,6 +8,11 @@ ended, and the environment that its timing was measured in. Whatever happens, th
 
 from __future__ import annotations
 
+if __name__ == "__main__":  # a program of our own
+    from rds.core.garbage import collect_rarely
+
+    collect_rarely()
+
 import faulthandler
 import json
 import logging

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 if __name__ == "__main__":  # a program of our own
     from rds.bus.tools.mf4 import put_off_asammdf
+    from rds.core.garbage import collect_rarely
 
+    collect_rarely()
     put_off_asammdf()
 
 import contextlib
@@ -25,6 +27,7 @@ from typing import Any
 from rds.bus.hub.command import Command
 from rds.bus.tools.link import BUILTIN, default_channel
 from rds.core.errors import RdsError
+from rds.core.garbage import leave
 from rds.core.private_files import keep_process_private
 from rds.core.scheduling import raise_priority
 from rds.interpolators.motion.jog import advance
@@ -174,4 +177,4 @@ def main(arguments: list[str]) -> int:
 
 if __name__ == "__main__":
     keep_process_private()
-    sys.exit(main(sys.argv[1:]))
+    leave(main(sys.argv[1:]))

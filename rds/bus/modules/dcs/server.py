@@ -12,7 +12,6 @@ import logging
 import os
 import queue
 import select
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -30,6 +29,7 @@ from rds.bus.modules.dcs.port import LOCK, SerialPort, is_device, link_of
 from rds.bus.modules.serve_loop import AFTERLIFE, as_process
 from rds.bus.tools.link import BUILTIN
 from rds.core.errors import InputError, MachineError
+from rds.core.garbage import leave
 from rds.core.interrupt import SignalEvent
 from rds.core.private_files import keep_process_private, write_private
 from rds.machines import Machine
@@ -256,4 +256,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     keep_process_private()
-    sys.exit(main())
+    leave(main())

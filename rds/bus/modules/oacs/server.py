@@ -9,12 +9,13 @@ from __future__ import annotations
 
 if __name__ == "__main__":  # a program of our own
     from rds.bus.tools.mf4 import put_off_asammdf
+    from rds.core.garbage import collect_rarely
 
+    collect_rarely()
     put_off_asammdf()
 
 import logging
 import queue
-import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -28,6 +29,7 @@ from rds.bus.modules.oacs.node import OacsNode
 from rds.bus.modules.serve_loop import Opener, serve_nodes
 from rds.bus.tools.link import BUILTIN
 from rds.core.errors import InputError
+from rds.core.garbage import leave
 from rds.core.private_files import keep_process_private
 from rds.machines import Machine
 from rds.machines.machine import Axis
@@ -121,4 +123,4 @@ def handle(line: str, nodes: Iterable[OacsNode]) -> None:
 
 if __name__ == "__main__":
     keep_process_private()
-    sys.exit(main())
+    leave(main())

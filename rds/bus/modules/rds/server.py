@@ -8,11 +8,12 @@ from __future__ import annotations
 
 if __name__ == "__main__":  # a program of our own
     from rds.bus.tools.mf4 import put_off_asammdf
+    from rds.core.garbage import collect_rarely
 
+    collect_rarely()
     put_off_asammdf()
 
 import queue
-import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -27,6 +28,7 @@ from rds.bus.modules.rds.module import AxisModule
 from rds.bus.modules.rds.module_node import ModuleNode
 from rds.bus.modules.serve_loop import Opener, serve_nodes
 from rds.bus.tools.link import BUILTIN
+from rds.core.garbage import leave
 from rds.core.private_files import keep_process_private, write_private
 from rds.machines import Machine
 from rds.machines.machine import Axis
@@ -98,4 +100,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     keep_process_private()
-    sys.exit(main())
+    leave(main())
