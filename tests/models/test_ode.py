@@ -65,6 +65,17 @@ def test_derivatives_may_come_in_the_same_array_each_time(kept):
     assert ode_model(derivatives, params=PARAMS).advance((1.0, 2.0), 3.0, T, PARAMS) == expected
 
 
+def test_many_states_move_as_few_do_to_the_bit():
+    """From 17 states on they are computed as an array, and as numbers before."""
+
+    def all_of_them(t, x, u, params):
+        return np.concatenate([axis(t, x[n : n + 2], u, params) for n in range(0, len(x), 2)])
+
+    one = ode_model(axis, params=PARAMS).advance((1.0, 2.0), 3.0, T, PARAMS)
+    many = ode_model(all_of_them, initial_state=[0.0] * 20, params=PARAMS).advance((1.0, 2.0) * 10, 3.0, T, PARAMS)
+    assert many == one * 10
+
+
 def test_motion_knows_the_time_since_the_run_began():
     model = ode_model(lambda t, x, u, params: [cos(t)], initial_state=[0.0])
     motion = model.motion(model, 0.1)
