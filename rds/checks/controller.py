@@ -231,6 +231,9 @@ class _Run:
         if _is_sequence(initial) and size(initial) and _is_sequence(final) and len(initial) != len(final):
             said = f"next_state has {len(final)} values and initial_state {len(initial)}"
             self.found.warn(clauses.NEXT_STATE, f"{said}; give both the same form")
+        elif isinstance(initial, np.ndarray) and isinstance(final, np.ndarray) and initial.shape != final.shape:
+            said = f"next_state has the shape {final.shape} and initial_state {initial.shape}"
+            self.found.warn(clauses.NEXT_STATE, f"{said}; give both the same form")
         if not has_nan(self.initial_state):
             for (t, *_), (_, state, *_) in self.calls:
                 if has_nan(state):

@@ -116,7 +116,7 @@ def say_what_is_replaced(folder: Path | None) -> None:
     from rds.modes.experiment.folder import holds_result
 
     if folder is not None and holds_result(folder):
-        typer.echo(f"rds: note: {folder}: replaces the results of an earlier run there", err=True)
+        typer.echo(f"rds: note: {folder}: replaces the results of an earlier run there once it has its own", err=True)
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from rds.core.adapt import is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error, student_line
 from rds.core.errors import ContractError, InputError
 from rds.core.folder_kept import folder_kept
@@ -151,7 +152,11 @@ def _student(variables: Mapping[str, Any], source: Source, validate: bool) -> St
     functions = {name: f for name in ARGUMENTS if callable(f := variables.get(name)) and not inspect.isclass(f)}
     if not any(name in INTERFACES for name in functions):
         names = ", ".join(form(name) for name in INTERFACES)
-        hint = near_misses({k: v for k, v in variables.items() if _is_written_here(v, variables)}) or _inner(source)
+        systems = [name for name, value in variables.items() if is_control_system(value)]
+        hint = f"`{systems[0]}` is a system of python-control: hand it in in Python, as in " if systems else ""
+        hint += f"`rds.Experiment(model={systems[0]})`" if systems else ""
+        hint = hint or near_misses({k: v for k, v in variables.items() if _is_written_here(v, variables)})
+        hint = hint or _inner(source)
         raise InputError(f"it defines none of {names}{'; ' + hint if hint else ''}", source.path or source.name)
     misfits = {name: fault for name, f in functions.items() if (fault := argument_fault(name, f))}
     if all(name in misfits for name in functions if name in INTERFACES):

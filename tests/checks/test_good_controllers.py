@@ -300,6 +300,16 @@ def test_a_state_that_holds_itself_twice_is_gone_through_once(kind):
     assert check_controller(control, initial_state=[0.0, 0.0, 0.0]).ok
 
 
+def test_a_state_that_changes_its_shape_is_worth_a_warning():
+    """A column plus a row is a square, which an observer's matrices make of it without a word."""
+
+    def control(t, r, y, state, params):
+        return GAIN * (r.position - y), state + np.array([1e-3, 1e-3])
+
+    report = check_controller(control, initial_state=np.zeros((2, 1)))
+    assert report.ok and "next_state has the shape (2, 2) and initial_state (2, 1)" in str(report.warnings[0])
+
+
 def test_a_user_may_check_with_an_exact_period_of_another_size():
     report = check_controller(proportional, 0.01)
     assert report.ok

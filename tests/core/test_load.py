@@ -309,3 +309,9 @@ def test_a_class_in_place_of_the_function_is_named(tmp_path: Path) -> None:
     file.write_text("class control:\n    def __call__(self, t, r, y, state, params):\n        return 0.0, state\n")
     with pytest.raises(InputError, match=r"its `control` is a class; write a function, `def control\(t, r, y, state"):
         load_student(file)
+
+
+def test_a_file_of_a_python_control_system_alone_is_told_where_that_goes(write):
+    system = write("import control\naxis = control.tf([176.0], [1.0, 100.0, 0.0])\n")
+    with pytest.raises(InputError, match=r"`axis` is a system of python-control.*Experiment\(model=axis\)"):
+        load_student(system)

@@ -97,6 +97,9 @@ from tests.grading.test_submissions_notebooks import made
         # what is called as a reader of files, and is none
         'def load(kind):\n    return {"axis": 30.0}[kind]\nparams["Kp"] = load("axis")',
         'class Gains:\n    def load(self, kind):\n        return {"axis": 30.0}[kind]\nkind = "axis"\nparams["Kp"] = Gains().load(kind)',
+        "class Path:\n    def __init__(self, k):\n        self.k = k\n    def open(self):\n        return 10 * self.k\n"
+        'params["Kp"] = Path(3.0).open()',
+        'open = lambda k: k\nPath = lambda k: k\nparams["Kp"] = open(Path(30.0))',
         'def best(kind, path=None):\n    return float(open(path).read()) if path else {"fast": 30.0}[kind]\nparams["Kp"] = best("fast")',
         'def kept(path, k):\n    with open(path, "w") as file:\n        file.write(str(k))\n    return k\nparams["Kp"] = kept("/dev/null", 30.0)',
         'def get(path):\n    try:\n        return float(open(path).read())\n    except OSError:\n        return 30.0\nparams["Kp"] = get("no-such.txt")',

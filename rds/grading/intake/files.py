@@ -24,17 +24,18 @@ class Files:
     names: Set[str] = field(default_factory=frozenset)
     own: Set[str] = field(default_factory=frozenset)  # the notebook's own functions that are called as a reader is
     methods: Set[str] = field(default_factory=frozenset)  # those of its classes that are
+    paths: Set[str] = _PATHS  # what makes names of files, but for the notebook's own of that name
 
     @classmethod
     def of(cls, body: Sequence[ast.stmt]) -> Files:
         """Those of these statements."""
         functions = {each.name: each for each in body if isinstance(each, followed.FUNCTIONS)}
+        classes = [each for each in body if isinstance(each, ast.ClassDef)]
         readers, own = set(_READERS), set(functions) & _READERS
         for name, function in functions.items():
             if _reads_its_first(function):
                 readers.add(name)
                 own.discard(name)
-        classes = (each for each in body if isinstance(each, ast.ClassDef))
         methods = {node.name for each in classes for node in each.body if isinstance(node, followed.FUNCTIONS)}
         values: dict[str, list[ast.AST | None]] = {}
         for node in chain.from_iterable(map(ast.walk, chain.from_iterable(map(at_once, body)))):
@@ -42,9 +43,12 @@ class Files:
             for target in targets:
                 if isinstance(target, ast.Name):
                     values.setdefault(target.id, []).append(value)
+        lambdas = {name for name, given in values.items() if any(isinstance(each, ast.Lambda) for each in given)}
+        own |= lambdas & _READERS
+        paths = _PATHS - functions.keys() - {each.name for each in classes} - lambdas
         names: set[str] = set()
         for _ in range(_AT_MOST):
-            names |= {name for name, given in values.items() if all(_is_name(each, names) for each in given)}
+            names |= {name for name, given in values.items() if all(_is_name(each, names, paths) for each in given)}
         for statement in body:
             if isinstance(statement, ast.ImportFrom):
                 readers |= {each.asname for each in statement.names if each.asname and each.name in _READERS}
@@ -53,7 +57,7 @@ class Files:
             for name, given in values.items()
             if any(isinstance(each, ast.Attribute | ast.Name) and last_word(each) in _READERS for each in given)
         }
-        return cls(readers, names, own, methods & _READERS)
+        return cls(readers, names, own, methods & _READERS, paths)
 
     def read_by(self, statement: ast.stmt) -> bool:
         """Whether a statement cannot do without a file that it names."""
@@ -63,11 +67,12 @@ class Files:
 
     def _reads(self, call: ast.Call) -> bool:
         function, word = call.func, last_word(call.func)
-        if isinstance(function, ast.Attribute) and word in _OF_PATHS and _is_name(function.value, self.names):
+        on_path = isinstance(function, ast.Attribute) and _is_name(function.value, self.names, self.paths)
+        if on_path and word in _OF_PATHS:
             return not _writes(call.args[:1], call.keywords)
         if word not in self.readers or word in (self.own if isinstance(function, ast.Name) else self.methods):
             return False
-        return bool(call.args) and _is_name(call.args[0], self.names) and not _opens_to_write(call)
+        return bool(call.args) and _is_name(call.args[0], self.names, self.paths) and not _opens_to_write(call)
 
 
 def _calls(tree: ast.AST) -> list[ast.Call]:
@@ -87,12 +92,12 @@ def _reads_its_first(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
     )
 
 
-def _is_name(value: ast.AST | None, names: Set[str]) -> bool:
+def _is_name(value: ast.AST | None, names: Set[str], paths: Set[str]) -> bool:
     """Whether an expression is the name of a file: a text, a path made of one, or a variable of `names`."""
     while isinstance(value, ast.BinOp):  # `Path("logs") / name`
         value = value.left
     if isinstance(value, ast.Call):
-        return last_word(value.func) in _PATHS
+        return last_word(value.func) in paths
     if isinstance(value, ast.Name):
         return value.id in names
     return isinstance(value, ast.JoinedStr) or (isinstance(value, ast.Constant) and isinstance(value.value, str))
