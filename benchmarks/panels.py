@@ -202,8 +202,8 @@ def _animated(page: Any, server: int, folder: Path) -> tuple[Result, float, floa
 def _held(page: Any) -> list[float]:
     """ms from a press of Hold until the page says that the axes are held, while two processes keep both cores busy."""
     page.click('.rds-nav button:text-is("Program")')
-    page.wait_for_selector(".rds-editor textarea:visible")
-    page.fill(".rds-editor textarea", "G21 G90 G94\nG1 X70 F30\nM2\n")
+    page.wait_for_selector(".rds-editor .cm-content:visible")
+    page.fill(".rds-editor .cm-content", "G21 G90 G94\nG1 X70 F30\nM2\n")
     page.wait_for_selector('.rds-verdict:has-text("1 move, ")', timeout=60_000)
     page.click('button:visible:text-is("Emulation")')
     page.click('button:visible:text-is("Run")')
