@@ -147,16 +147,21 @@ def from_function(
     return _student(variables, _source(name, _source_text(function)), validate)
 
 
+def _system(variables: Mapping[str, Any]) -> str:
+    """Where a python-control system of the file goes, which fills no interface there; empty if there is none."""
+    name = next((name for name, value in variables.items() if is_control_system(value)), None)
+    if name is None:
+        return ""
+    return f"`{name}` is a system of python-control: hand it in in Python, as in `rds.Experiment(model={name})`"
+
+
 def _student(variables: Mapping[str, Any], source: Source, validate: bool) -> StudentFile:
     # `import control` or `from scipy import interpolate` is no controller and no interpolator
     functions = {name: f for name in ARGUMENTS if callable(f := variables.get(name)) and not inspect.isclass(f)}
     if not any(name in INTERFACES for name in functions):
         names = ", ".join(form(name) for name in INTERFACES)
-        systems = [name for name, value in variables.items() if is_control_system(value)]
-        hint = f"`{systems[0]}` is a system of python-control: hand it in in Python, as in " if systems else ""
-        hint += f"`rds.Experiment(model={systems[0]})`" if systems else ""
-        hint = hint or near_misses({k: v for k, v in variables.items() if _is_written_here(v, variables)})
-        hint = hint or _inner(source)
+        written_here = {k: v for k, v in variables.items() if _is_written_here(v, variables)}
+        hint = _system(variables) or near_misses(written_here) or _inner(source)
         raise InputError(f"it defines none of {names}{'; ' + hint if hint else ''}", source.path or source.name)
     misfits = {name: fault for name, f in functions.items() if (fault := argument_fault(name, f))}
     if all(name in misfits for name in functions if name in INTERFACES):
