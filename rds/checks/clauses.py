@@ -39,5 +39,5 @@ SEGMENTS = "kinds of segments"
 NO_GLOBALS = "keep no memory between calls"
 
 # file
-PRINTS = "prints nothing"
+PRINTS = "no printing"
 OTHERS = "other functions"

@@ -23,7 +23,7 @@ from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import RdsError
 from rds.core.signature import argument_fault
 from rds.core.types import Model
-from rds.core.values import shown
+from rds.core.values import is_table, shown
 
 BUDGET = 2.0  # s for each pass over the run
 SUBSTEPS = 2  # of RK4 in each sample: the check wants the path's kind, not its digits
@@ -116,6 +116,10 @@ class _Check:
         if vector is None or not vector.size or not np.isfinite(vector).all():
             remedy = "write a list of finite numbers, as in `initial_state = [0.0, 0.0]`"
             self.found.fault(clauses.INITIAL_STATE, f"initial_state is {shown(given)}; {remedy}")
+            return False
+        if is_table(given):
+            remedy = f"write one list, as in `initial_state = {vector.tolist()}`"
+            self.found.fault(clauses.INITIAL_STATE, f"initial_state is {shown(given)}, a table of numbers; {remedy}")
             return False
         self.x0 = vector
         size = self._size_for(vector.size)

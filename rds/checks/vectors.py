@@ -11,10 +11,10 @@ from rds.core.values import shown
 
 
 def vector_of(answer: Any) -> np.ndarray | None:
-    """The numbers in `answer`, an array or a sequence of numbers, as the models' runtime reads it; None if none."""
+    """The numbers in `answer`, one or an array or sequence of them, as the models' runtime reads it; None if none."""
     try:
-        if isinstance(answer, np.ndarray):
-            parts = [answer]
+        if isinstance(answer, np.ndarray | np.number | int | float) and not isinstance(answer, bool):
+            parts = [np.asarray(answer)]
         elif isinstance(answer, list | tuple):
             parts = [np.asarray(part) for part in answer]
         else:
@@ -36,7 +36,7 @@ def vector_fault(answer: Any, n: int) -> tuple[str, str, str] | None:
         return clauses.SHAPE, shown(answer), f"return a list of {count}"
     if vector.size != n:
         said = f"{vector.size} value{'s' if vector.size != 1 else ''}, {shown(answer)},"
-        return clauses.SHAPE, said, f"return {count}"
+        return clauses.SHAPE, said, f"return a list of {count}"
     if not np.isfinite(vector).all():
         return clauses.FINITE, shown(answer), "look for a division by zero, a root or a logarithm"
     return None

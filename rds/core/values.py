@@ -45,6 +45,13 @@ def _is_vast(value: Any) -> bool:
     return bool(left)
 
 
+def is_table(values: Any) -> bool:
+    """Whether it holds rows and columns of numbers, as [[0, 0], [0, 0]] does; one row or column alone is a list."""
+    parts = list(values) if isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.ndim) else []
+    sizes = [len(part) if isinstance(part, list | tuple) else np.size(part) for part in parts]
+    return len(sizes) > 1 and max(sizes) > 1
+
+
 def own_copy(value: Any, what: str, where: str | None = None) -> Any:
     """A copy that shares nothing with `value`, which is the `what` of the error's sentence.
 

@@ -18,7 +18,7 @@ from rds.core.errors import ContractError, InputError
 from rds.core.integrate import SUBSTEPS, rk4
 from rds.core.timed_motion import TimedMotion
 from rds.core.types import Model, Source
-from rds.core.values import shown
+from rds.core.values import is_table, shown
 
 Function = Callable[..., Any]
 
@@ -47,7 +47,7 @@ def ode_model(
         advance=partial(_advance_by_rk4, derivatives=derivatives, substeps=substeps, where=_place(source)),
         initial_state=start,
         params=own,
-        output=_output(output, own),
+        output=_output(output, own, _place(source)),
         source=source or Source(_name(derivatives)),
         motion=TimedMotion,
         has_velocity=_has_velocity(start, output),
@@ -73,7 +73,7 @@ def advance_model(
         advance=partial(_advance_by_student, function=advance, where=_place(source)),
         initial_state=start,
         params=own,
-        output=_output(output, own),
+        output=_output(output, own, _place(source)),
         source=source or Source(_name(advance)),
         motion=TimedMotion if output is not None else None,
         has_velocity=_has_velocity(start, output),
@@ -177,8 +177,8 @@ def _numbers(answer: Any) -> np.ndarray:
     return array.astype(float, copy=False).ravel()
 
 
-def _output(output: Function | None, own: Mapping[str, Any]) -> Callable[..., float] | None:
-    return None if output is None else partial(_output_by_student, function=output, own=own)
+def _output(output: Function | None, own: Mapping[str, Any], where: str | None) -> Callable[..., float] | None:
+    return None if output is None else partial(_output_by_student, function=output, own=own, where=where)
 
 
 def _output_by_student(
@@ -188,12 +188,14 @@ def _output_by_student(
     own: Mapping[str, Any],
     t: float = 0.0,
     params: Mapping[str, Any] | None = None,
+    where: str | None = None,
 ) -> float:
     # The encoder reads before the voltage of this sample is known, so an output cannot depend on it.
     answer = function(t, np.array(x, dtype=float), np.zeros(1), own if params is None else params)
     values = _flat(answer)
-    if values.size == 0:
-        raise ContractError(f"output() returned {shown(answer, 200)}; it must return the measured position, one number")
+    if values.size != 1:
+        said = f"output() returned {shown(answer, 200)}; it must return the measured position, one number"
+        raise ContractError(f"{said}, as in `return x[0]`", where)
     return float(values[0])
 
 
@@ -203,6 +205,10 @@ def _initial_state(values: Sequence[float]) -> tuple[float, ...]:
         raise InputError(
             f"model: initial_state = {shown(values, 200)} must hold finite numbers, such as [0.0, 0.0] for "
             f"position and velocity"
+        )
+    if is_table(values):
+        raise InputError(
+            f"model: initial_state = {shown(values, 200)} is a table; write one list, {shown(state.tolist())}"
         )
     return tuple(state.tolist())
 

@@ -126,7 +126,7 @@ def test_the_broken_clause_is_named(bad, clause, detail):
     assert detail in str(report)
 
 
-@pytest.mark.parametrize("state", ["rest", [], [math.nan, 0.0], 3.0, {"x": 0.0}])
+@pytest.mark.parametrize("state", ["rest", [], [math.nan, 0.0], 3.0, {"x": 0.0}, [[0.0], [0.0, 1.0]], np.eye(2)])
 def test_initial_state_must_hold_numbers(state):
     assert [fault.clause for fault in check_model(axis, initial_state=state).faults] == [clauses.INITIAL_STATE]
 
@@ -186,6 +186,8 @@ GOOD = [
     (advance, None, None),
     (euler, (0.0, 0.0), None),
     (lambda t, x, u, params: [(u[0] - x[0]) / 0.1], [0.0], None),
+    (lambda t, x, u, params: (u[0] - x[0]) / 0.1, 0, None),
+    (axis, [[0.0], [0.0]], None),
 ]
 
 

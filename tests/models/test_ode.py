@@ -89,6 +89,9 @@ def test_output_says_what_the_encoder_sees():
     assert model.output(model.initial_state) == 2.0 * PARAMS["tau"]
     motion = model.motion(model, T)
     assert motion.read() == 2.0 * PARAMS["tau"]
+    both = ode_model(axis, [1.0, 2.0], PARAMS, output=lambda t, x, u, params: x)
+    with pytest.raises(ContractError, match=r"output\(\) returned .*one number, as in `return x\[0\]`"):
+        both.output(both.initial_state)
 
 
 @pytest.mark.parametrize("first", [lambda u: u, lambda u: u[0]])
@@ -119,7 +122,7 @@ def test_answers_of_the_wrong_size_break_the_contract(answer):
         advance_model(lambda x, u, T, params: answer).advance((0.0, 0.0), 0.0, T, {})
 
 
-@pytest.mark.parametrize("state", [[], "rest", [float("nan"), 0.0], None])
+@pytest.mark.parametrize("state", [[], "rest", [float("nan"), 0.0], None, [[0.0, 1.0], [2.0, 3.0]]])
 def test_bad_initial_states_are_refused(state):
     with pytest.raises(InputError, match="initial_state"):
         ode_model(axis, state)

@@ -4,6 +4,7 @@ a part program; held and slowed down by hand while it runs; too slow, which the 
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import rds
 from rds.cli.main import app
 from rds.modes.experiment.run import Run
 from rds.modes.loop.execution import State
+from rds.nc.run.report import findings
 from rds.nc.run.run import PartProgram
 
 T = 0.005
@@ -133,6 +135,8 @@ def test_velocities_that_are_not_the_positions_are_told(here: Path) -> None:
     still = circle(interpolator="reference-pulse", **slant).run()
     assert not any("differ" in note for note in still.meta["notes"])
     assert right.meta["program"]["limit_shares"]["X"]["acceleration"] == pytest.approx(5.0 / T / 200.0)
+    told = " ".join(findings(right.meta["program"]))
+    assert re.search(r"at most [\d,]+ times a limit \(jerk of [XY]\)\. An interpolator does not plan within", told)
 
 
 def part() -> PartProgram:

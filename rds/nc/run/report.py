@@ -97,7 +97,13 @@ def findings(about: dict[str, Any]) -> list[str]:
     share, kind, axis = max(
         (share, kind, axis) for axis, shares in about["limit_shares"].items() for kind, share in shares.items()
     )
-    said.append(f"What was sent to the axes is at most {100.0 * share:.1f} % of a limit ({kind} of {axis}).")
+    size = f"{100.0 * share:.1f} % of" if share < 10.0 else f"{share:,.0f} times"
+    said.append(f"What was sent to the axes is at most {size} a limit ({kind} of {axis}).")
+    if share > 1.0 and "interpolator" in about:
+        said.append(
+            "An interpolator does not plan within the limits: where its feed jumps, acceleration and jerk have no "
+            "bound. A profile of planned motion in its place keeps within them."
+        )
     predicted, moving = about["predicted_s"], about["moving_s"]
     if not about["completed"]:
         said.append(f"The run ended in {of} {about['last_line']}, after {about['done_percent']:.1f} % of the program.")
