@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import ContractError, InputError
 from rds.core.integrate import rk4
 from rds.core.timed_motion import TimedMotion
@@ -83,7 +84,11 @@ def as_model(obj: Any, T: float) -> Model:
         flow = np.hstack([np.asarray(sys.A, dtype=float), np.asarray(sys.B, dtype=float)]) if continuous else None
         return Model(partial(_linear_advance, period=T, flow=flow), state, params, output, Source(_name(sys)))
     reads = partial(_nonlinear_output, sys=sys)
-    _check_no_jump(sys, reads(state) != reads(state, voltage=1.0))
+    try:
+        jumps = reads(state) != reads(state, voltage=1.0)
+    except STUDENT_ERRORS as error:
+        raise ContractError(f"model {_name(sys)}: its output function fails: {student_error(error)}") from error
+    _check_no_jump(sys, jumps)
     advance = partial(_nonlinear_advance, sys=sys, period=T, continuous=continuous)
     return Model(advance, state, dict(sys.params), reads, Source(_name(sys)), motion=TimedMotion, timed=True)
 

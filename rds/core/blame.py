@@ -8,6 +8,7 @@ import sysconfig
 from pathlib import Path
 from traceback import FrameSummary, extract_tb
 
+from rds.core.errors import RdsError
 from rds.core.types import Source
 
 STUDENT_ERRORS = (Exception, SystemExit)
@@ -34,7 +35,7 @@ def student_error(exc: BaseException, path_or_source: str | Path | Source | None
     if not own and isinstance(exc.__cause__, StopIteration):  # in a generator: its own error has no line
         own = _own_frames(exc.__cause__, path)
     if not own:
-        return f"{type(exc).__name__}: {_text(exc)}"
+        return str(exc) if isinstance(exc, RdsError) else f"{type(exc).__name__}: {_text(exc)}"
     frame = own[-1]
     line = (frame.line or linecache.getline(frame.filename, frame.lineno or 0)).strip()
     name = "a notebook cell" if "ipykernel" in frame.filename else Path(frame.filename).name

@@ -89,16 +89,22 @@ def limited(steps: Callable[[], Any] = lambda: None, seconds: float | None = Non
                         _raise_in(here, Overdue)
                 since = now - limit + PATIENCE  # once more if the code has caught it
 
+    def over() -> None:
+        with lock:
+            ended.set()
+
     watcher = threading.Thread(target=look, name="rds limit", daemon=True)
     with contextlib.suppress(RuntimeError):
         watcher.start()
     try:
         yield
     finally:
-        with lock:
-            ended.set()
-        if was_late:
-            _take_back(here)
+        try:
+            over()
+        finally:  # once more where it was raised within that: the watcher would raise it for ever
+            over()
+            if was_late:
+                _take_back(here)
 
 
 class _TakenBack(BaseException):

@@ -86,5 +86,6 @@ def make_signal(kind: str, **options: Any) -> Signal:
     check_known(options, parameters, f"signal of kind {kind!r}")
     missing = [name for name, p in parameters.items() if p.default is p.empty and name not in options]
     if missing:
-        raise InputError(f"signal of kind {kind!r} needs {' and '.join(missing)}; it has {', '.join(parameters)}")
+        known = ", ".join(parameters)
+        raise InputError(f"signal of kind {kind!r} needs {' and '.join(missing)}; its options are {known}")
     return _KINDS[kind](**options)

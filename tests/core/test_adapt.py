@@ -251,3 +251,9 @@ def test_whether_a_law_has_a_place_of_its_own_does_not_depend_on_the_sizes_of_it
     observer = as_controller(control.ss(A, B, C, system.D, T), T)
     start = observer.initial_state
     assert observer.control(0.0, Reference(64.0, 0.0, 0.0), 64.0, start, observer.params)[0] == 0.0
+
+
+def test_an_output_function_that_fails_is_told_with_its_system_and_line():
+    blind = control.nlsys(lambda t, x, u, p: u, lambda t, x, u, p: x[5], inputs=1, outputs=1, states=1, name="blind")
+    with pytest.raises(ContractError, match=r"model blind: its output function fails: test_adapt.py, line \d+"):
+        as_model(blind, 1e-3)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -22,9 +24,28 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_what_is_quick_is_left_alone() -> None:
     for _ in range(100):
-        with limited(seconds=0.05):
+        with limited(seconds=0.25):
             pass
-    time.sleep(0.1)
+    time.sleep(0.3)
+
+
+def test_a_limit_that_is_over_as_the_code_ends_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Late(threading.Event):
+        was_set = False
+
+        def set(self) -> None:
+            if not self.was_set:
+                self.was_set = True
+                raise Endless(0.05)  # as from the watcher, just then
+            super().set()
+
+    monkeypatch.setattr(interrupt, "threading", SimpleNamespace(**{**vars(threading), "Event": Late}))
+    with pytest.raises(Endless), limited(seconds=0.05):
+        pass
+    for watcher in threading.enumerate():
+        if watcher.name == "rds limit":
+            watcher.join(5.0)
+            assert not watcher.is_alive()
 
 
 def test_steps_keep_it_going() -> None:
