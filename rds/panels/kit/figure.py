@@ -41,7 +41,7 @@ class FigureView(widgets.VBox):
         self._room: _Room | None = None
         self.figure: Any = None
         self._waiting: Any = None
-        self._drawing: Html | None = None  # what is shown meanwhile
+        self._drawing: Html | None = None  # what is said meanwhile
         self._shown: list[widgets.Widget] = []  # closed when something else is: a kernel keeps every open widget
 
     def show(self, figure: Any, session: Session, caption: str = "") -> None:
@@ -71,9 +71,11 @@ class FigureView(widgets.VBox):
         `then()` is called once it is there.
         """
         self.clear()
-        # it stays, too: one that is closed a moment later is no widget any more when a busy page comes to show it
-        self._drawing = self._drawing or Html('<p role="status">drawing …</p>')
-        self.children = [*self.children, self._drawing]
+        if self._drawing is None:
+            self._drawing = Html()
+            self._drawing.add_class("rds-drawing")
+            self.children = self._standing()
+        self._drawing.value = '<p role="status">drawing …</p>'
         task = self._waiting = session.work("a plot", lambda task: make())
 
         def look() -> None:
@@ -99,8 +101,9 @@ class FigureView(widgets.VBox):
     def clear(self) -> None:
         """Nothing to show."""
         self._waiting = self.figure = None
-        # it stays: of a widget that is shown once more, ipywidgets keeps what the page had of it before
-        self.children = [self._room] if self._room is not None else []
+        if self._drawing is not None:
+            self._drawing.value = ""
+        self.children = self._standing()
         for widget in self._shown:
             toolbar = getattr(widget, "toolbar", None)  # an ipympl canvas has one
             for part in (
@@ -119,7 +122,13 @@ class FigureView(widgets.VBox):
         box = widgets.VBox(shown)
         self._shown = [*shown, box]
         self._room = self._room or _Room(self._fit)
-        self.children = [self._room, box]
+        if self._drawing is not None:
+            self._drawing.value = ""
+        self.children = [*self._standing(), box]
+
+    def _standing(self) -> list[widgets.DOMWidget]:
+        """What stays on the page: of a widget that is shown once more, ipywidgets keeps what was there before."""
+        return [each for each in (self._drawing, self._room) if each is not None]
 
     def _fit(self, pixels: float) -> None:
         """The place is so wide."""
