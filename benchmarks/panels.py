@@ -232,7 +232,7 @@ def _growth(page: Any, server: int, folder: Path) -> tuple[float, float, float]:
     The rest of the heap is machine code: the browser compiles a function once it has been called often.
     """
     page.select_option('.rds-field:has(label:text-is("Mode")) select', label="Simulation")
-    page.get_by_label("Final time").fill("0.2")
+    page.get_by_label("Final time").filter(visible=True).fill("0.2")
     page.keyboard.press("Enter")
     session = page.context.new_cdp_session(page)
 

@@ -57,6 +57,8 @@ def test_cells_are_filled_with_the_keys_and_two_islands_are_refused_with_their_p
     page.click('.rds-cells-bar button:text-is("Clear")')
     page.wait_for_selector('.rds-cells[data-filled="0"]')
     page.focus(".rds-cells canvas")
+    for key in 30 * ("ArrowUp", "ArrowLeft"):  # into the corner, wherever it was left
+        page.keyboard.press(key)
     for key in ("ArrowDown", "ArrowRight", "Space", "Shift+ArrowRight", "Shift+ArrowDown"):
         page.keyboard.press(key)
     page.wait_for_selector('.rds-cells[data-filled="3"]')

@@ -97,7 +97,7 @@ class Equipment:
         return Path(self._saved_in())
 
     def _saved_in(self) -> str:
-        place = self.page.locator(':text("Saved with its report in") code')
+        place = self.page.locator(':text("Saved with its report in") code').filter(visible=True)
         return str(place.inner_text()) if place.count() else ""
 
 

@@ -68,11 +68,11 @@ def test_the_keyboard_runs_and_stops_and_what_comes_of_it_is_read_out(
     page.keyboard.press("ArrowUp")
     page.keyboard.press("Enter")
     page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
-    page.get_by_label("Final time").fill("0.25")  # its label is its name
+    page.get_by_label("Final time").filter(visible=True).fill("0.25")  # its label is its name
     page.keyboard.press("Control+Enter")  # what was typed holds
     page.wait_for_selector('.rds-notice[aria-live=polite] [role=status]:has-text("done: 250 samples"):visible')
-    page.get_by_label("Mode", exact=True).select_option(label="Emulation")
-    page.get_by_label("Final time").fill("600")
+    page.get_by_label("Mode", exact=True).filter(visible=True).select_option(label="Emulation")
+    page.get_by_label("Final time").filter(visible=True).fill("600")
     for _ in range(2):  # the first one waits for what was typed, the second one is on its way
         page.keyboard.press("Control+Enter")
         page.keyboard.press("Escape")  # before there is a Stop

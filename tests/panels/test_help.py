@@ -143,7 +143,10 @@ def test_help_opens_at_the_page_of_the_panel(open_page: Callable[..., Any]) -> N
     frame.locator('body[data-theme="dark"] #search-results li').first.wait_for()
     assert page.locator('.rds-guide a[href$="colours=dark"]').count() == 1
     page.click('.rds-nav button:text-is("Main menu")')
-    page.click('.rds-nav button:text-is("Help")')  # and when it is shown again
+    page.click('.rds-nav button:text-is("Help")')  # also when it is shown again
+    frame.locator('body[data-theme="dark"] #search-results li').first.wait_for()
+    page.click('.rds-nav button:text-is("Equipment control")')
+    page.click('.rds-head button:text-is("Help")')  # and when it is asked for its first page again
     frame.locator('body[data-theme="dark"] h1:has-text("Equipment")').wait_for()
     page.wait_for_selector('.rds-guide a[href$="colours=dark"]')
 

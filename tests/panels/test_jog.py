@@ -109,6 +109,11 @@ def test_drives_are_held_turned_and_homed(
     page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")  # another tab is looked at
     page.wait_for_function(f"Math.abs({SPEED}) < 50")
     page.evaluate("delete document.hidden")
+    page.click('button[aria-label="spindle forward"]')
+    page.wait_for_function(f"Math.abs({SPEED} - 1000) < 50")
+    page.click('.rds-nav button:text-is("Main menu")')  # another panel is looked at
+    page.wait_for_function(f"Math.abs({SPEED}) < 50")
+    page.click('.rds-nav button:text-is("Jog")')
     page.click('.rds-field:has-text("Axes to home") button:text-is("X")')
     page.select_option('.rds-field:has-text("Homing method") select', "17: negative limit switch")
     page.click('button:text-is("Find home")')

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from tests.panels.conftest import App
+from tests.panels.conftest import App, turn_to
 
 
 def test_page_shows_its_menu_dark_and_light_with_the_stop_in_sight_which_answers(open_page: Callable[..., Any]) -> None:
@@ -19,6 +19,15 @@ def test_page_shows_its_menu_dark_and_light_with_the_stop_in_sight_which_answers
     assert page.evaluate("getComputedStyle(document.querySelector('.rds-app')).backgroundColor") != light
     page.click("button.rds-stop")  # no module is there
     page.wait_for_selector('.rds-notice:has-text("no module is on the bus")')
+
+
+def test_a_panel_that_was_left_stays_out_of_sight_and_is_not_made_anew(same_page: Callable[[str], Any]) -> None:
+    page = same_page("Objects")
+    page.evaluate("document.querySelector('.rds-panel > :not(.rds-away)').id = 'left'")
+    turn_to(page, "Main menu")
+    page.wait_for_selector("#left", state="hidden")
+    turn_to(page, "Objects")
+    page.wait_for_selector("#left", state="visible")
 
 
 def test_the_emergency_stop_has_its_corner_at_every_width_and_zoom_and_is_hit_at_its_centre(

@@ -52,6 +52,7 @@ class Guide:
         from rds.panels.help.build import page_file
 
         address = escape(f"{help_server().url(page_file(self._subject))}?colours={self.shell.colours.name}")
+        self.frame.value = ""  # anew even where the page is the same: its reader may have gone on from there
         self.frame.value = (
             f'<a href="{address}" target="_blank" rel="noopener">open in a page of its own</a>'
             f'<iframe src="{address}" title="Help"></iframe>'

@@ -27,6 +27,9 @@ from rds.panels.page.still_here import StillHere
 from rds.panels.registry import PANELS
 from rds.panels.session.session import Message, Session
 
+# On a panel that was left. It stays on the page: making it anew took half a second, and ipywidgets leaves a megabyte.
+_AWAY = "rds-away"
+
 
 class Shell:
     """One page. Panels are built when they are opened first, and stay as they were left.
@@ -71,18 +74,21 @@ class Shell:
     def open(self, name: str) -> None:
         """Go to the panel called `name`; InputError if there is none."""
         module = PANELS.module(name)
+        if self.here in self.panels and self.here != name:
+            self.panels[self.here].add_class(_AWAY)
         if name not in self.panels:  # its title answers at once; making what is below it takes some tenths of a second
             self._place.add_class("rds-opening")
-            self._place.children = []
         self.here = name
         for other, each in self._buttons.items():
             (each.add_class if other == name else each.remove_class)("rds-here")
         about = f"{escape(self.session.machine)} · files in {escape(str(self.session.folder))}"
         self._title.value = f"<h1>{escape(module.TITLE)}</h1><p>{about}</p>"
-        if name not in self.panels:
-            with made_at_once():
-                self.panels[name] = self._built(module)
-        self._place.children = [self.panels[name]]
+        if name in self.panels:
+            self.panels[name].remove_class(_AWAY)
+            return
+        with made_at_once():
+            self.panels[name] = self._built(module)
+        self._place.children = [*self._place.children, self.panels[name]]
         self._place.remove_class("rds-opening")
 
     def say(self, text: str, kind: str = "note") -> None:

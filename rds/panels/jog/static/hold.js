@@ -66,6 +66,8 @@ function render({ model, el }) {
   window.addEventListener("blur", release);
   window.addEventListener("pagehide", release);
   document.addEventListener("visibilitychange", hidden);
+  const sight = new ResizeObserver(() => box.clientWidth || release()); // another panel is looked at
+  sight.observe(box);
   const enable = () => {
     for (const button of buttons) button.disabled = model.get("disabled");
     if (model.get("disabled")) release();
@@ -96,6 +98,7 @@ function render({ model, el }) {
     window.removeEventListener("blur", release);
     window.removeEventListener("pagehide", release);
     document.removeEventListener("visibilitychange", hidden);
+    sight.disconnect();
   };
 }
 export default { render };

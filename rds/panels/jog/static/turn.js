@@ -55,6 +55,8 @@ function render({ model, el }) {
   const hidden = () => document.hidden && stop();
   window.addEventListener("pagehide", stop);
   document.addEventListener("visibilitychange", hidden);
+  const sight = new ResizeObserver(() => box.clientWidth || stop()); // another panel is looked at
+  sight.observe(box);
   const enable = () => {
     for (const button of buttons) button.disabled = model.get("disabled");
     if (model.get("disabled")) forget();
@@ -75,6 +77,7 @@ function render({ model, el }) {
     model.off("msg:custom", told);
     window.removeEventListener("pagehide", stop);
     document.removeEventListener("visibilitychange", hidden);
+    sight.disconnect();
   };
 }
 export default { render };

@@ -90,13 +90,15 @@ function render({ el }) {
   let due = 0;
   const seen = new MutationObserver((changes) => {
     due ||= setTimeout(() => { due = 0; label(); }, 50); // once for what comes together
-    if (changes.some((each) => each.type === "childList" && each.target.matches(".rds-panel"))) app.scrollTop = 0;
+    const came = (each) => each.type === "childList" ? each.target.matches(".rds-panel")
+      : (each.oldValue ?? "").includes("rds-away") && !each.target.matches(".rds-away");
+    if (changes.some(came)) app.scrollTop = 0;
   });
   const begun = requestAnimationFrame(() => {
     app = el.closest(".rds-app");
     if (!app) return;
     label();
-    seen.observe(app, { childList: true, subtree: true, attributes: true, attributeFilter: ["class"] });
+    seen.observe(app, { childList: true, subtree: true, attributes: true, attributeFilter: ["class"], attributeOldValue: true });
     app.addEventListener("keydown", pressed, true); // before the fields, which let no key out of them
     window.addEventListener("keydown", keep, true);
     window.addEventListener("click", clicked, true); // before presence.js, which holds some back

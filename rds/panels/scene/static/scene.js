@@ -199,6 +199,7 @@ function render({ model, el }) {
   function frame(time) {
     due = 0;
     if (!model.get("shows") || !el.isConnected) return;
+    if (!canvas.clientWidth) { stale = true; return; } // out of sight: drawn when it has a size again
     const passed = Math.min((time - before) / 1000, 0.25);
     before = drawn = time;
     const live = model.get("live") && follows;
