@@ -299,7 +299,7 @@ def test_earlier_runs_are_reopened_and_laid_over(at: Callable[..., Equipment]) -
     control.page.wait_for_selector('[data-lanes="2"]')
     control.press("Cursors")
     said = control.page.wait_for_selector('.rds-strip-read th:has-text("B − A")').inner_text()
-    control.page.locator('input[aria-label="cursor A"]').press("ArrowLeft")
+    control.page.locator('input[aria-label="cursor A"]:visible').press("ArrowLeft")
     control.page.wait_for_function(
         "(said) => !document.querySelector('.rds-strip-read').innerText.includes(said)", arg=said
     )
