@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
+from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -239,8 +241,10 @@ class _Work:
         """SubmissionError where functions are handed in, and the file has none of those that are tested."""
         names = {test.function for criterion in self.assignment.criteria for test in criterion.tests}
         shown = sorted({t.function for c in self.assignment.criteria if not self._hides(c) for t in c.tests})
-        if self.assignment.kind == "functions" and names.isdisjoint(opened.functions().defines):
+        if self.assignment.kind == "functions" and names.isdisjoint(there := opened.functions().defines):
             said = ", ".join(f"{name}()" for name in shown) or "the functions that the assignment asks for"
+            close = ((own, name) for name in shown for own in get_close_matches(name, there, n=1, cutoff=0.7))
+            said += "".join(f"; it has {own}(); did you mean {name}()?" for own, name in islice(close, 1))
             raise SubmissionError(Status.FAILED_TO_LOAD, f"it defines none of what is asked for: {said}")
 
     def _run(self, case: Case, opened: Opened) -> None:
