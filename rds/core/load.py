@@ -386,6 +386,9 @@ def load_error(error: BaseException, file: Path) -> InputError:
     if isinstance(error, SyntaxError) and Path(error.filename or "") == file:
         text = (error.text or "").strip()
         return InputError(f"syntax error: {error.msg}{f': `{text}`' if text else ''}; {_PYTHON} cannot read it", where)
+    if line is None and isinstance(error, MemoryError | RecursionError):  # the parser's: no line of it has run
+        said = "brackets, operators or `elif` lie too deep in each other; split them"
+        return InputError(f"{_PYTHON} cannot read it: {said}", where)
     said = student_error(error, file)
     if isinstance(error, SystemExit):
         return InputError(f"it ends the program while it loads: {said}; remove the exit", where)

@@ -37,6 +37,11 @@ def failure(path) -> str:
     return str(caught.value)
 
 
+@pytest.mark.parametrize("text", ["x = " + "-" * 100_000 + "1", "x = " + "1+" * 100_000 + "1", "x = a" + ".a" * 60_000])
+def test_what_the_parser_has_no_room_for_is_told_as_such(text, write):
+    assert re.search(r"Python 3\.\d+ cannot read it: brackets, operators or `elif` lie too deep", failure(write(text)))
+
+
 def test_the_file_is_known_by_its_path_text_and_digest(write):
     path = write(CONTROL)
     student = load_student(path)

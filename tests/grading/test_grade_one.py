@@ -249,6 +249,20 @@ def test_what_cannot_be_measured_is_for_a_review_and_no_zero(made: Make, tmp_pat
     assert gated and all(0.0 < score.score <= 0.5 * score.max_score for score in gated)
 
 
+@pytest.mark.parametrize(
+    "beside", ["1e-9 * perf_counter_ns() % 1e-7", "1.2 * (round(y / 0.001) * 7919 % 101 / 50.0 - 1.0)"]
+)
+def test_who_makes_a_poor_margin_unmeasurable_gains_nothing(beside: str, made: Make, tmp_path: Path) -> None:
+    """By a clock in its voltage, or by what no linear law comes near to."""
+    poor = GAIN.format(gain=300.0)
+    made_so = "from time import perf_counter_ns\n" + poor.replace(", state\n", f" + {beside}, state\n")
+    assignment = made(TWO_CASES)
+    plain = grade(assignment, file(tmp_path, poor), "ada", TrustedFiles())
+    found = grade(assignment, file(tmp_path, made_so), "ada", TrustedFiles())
+    assert [score.name for score in found.for_review] == ["margin"] and not plain.for_review
+    assert found.score <= plain.score < 0.25 * plain.max_score, (found.score, plain.score)
+
+
 def test_a_hard_link_is_refused(made: Make, tmp_path: Path) -> None:
     path = file(tmp_path, STATEFUL)
     (tmp_path / "other.py").hardlink_to(path)

@@ -124,9 +124,10 @@ def test_functions_are_called_and_judged_here(tmp_path: Path, pool: Pool) -> Non
     assert "double() failed: " in fails and "line 2, in double: ZeroDivisionError" in fails
     (folder / "cheat.py").write_text(equal + "def double(x): return E()\nword = truth = lambda: E()\n")
     assert both(read_assignment(folder), folder / "cheat.py", pool).score == 0.0
-    (folder / "none.py").write_text("def other(x): return x\n")
+    (folder / "none.py").write_text("def other(x): return x\ndef words(): return 'yes'\n")
     none = both(read_assignment(folder), folder / "none.py", pool)
     assert none.status is Status.FAILED_TO_LOAD and "double(), truth(), word()" in none.reason
+    assert none.reason.endswith("; it has words(); did you mean word()?")
 
 
 @pytest.mark.parametrize(

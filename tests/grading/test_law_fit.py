@@ -327,7 +327,10 @@ def control(t, r, y, state, params):
 def test_no_honest_law_is_called_unstable_by_a_law_that_is_only_near_it(name: str, plant: str, tmp_path: Path) -> None:
     for seed in (2, 3, 6, 7):  # the nearest law alone would be called unstable with one or more
         found = loop_of(tmp_path, UNLIKE_ANY[name], seed, plant, moving=True)
-        assert found.margins[1] > 45.0 if isinstance(found, LinearLoop) else not found.is_known, (seed, found)
+        if isinstance(found, NoLoop):
+            assert not found.is_known, (seed, found)
+            found = found.nearest
+        assert found is None or found.margins[1] > 45.0, (seed, found)  # nor paid as one until somebody has looked
 
 
 @pytest.mark.parametrize(
@@ -352,7 +355,10 @@ def test_coarse_rounding_is_measured_or_is_for_a_review(step: float, tmp_path: P
     law = SOLUTION + WRAPPED.format(before=f"y = round(y / {step}) * {step}", after="pass")
     for moving in (False, True):
         found = loop_of(tmp_path, law, moving=moving)
-        assert found.margins[1] > 50.0 if isinstance(found, LinearLoop) else not found.is_known
+        if isinstance(found, NoLoop):
+            assert not found.is_known
+            found = found.nearest
+        assert found is None or found.margins[1] > 50.0
 
 
 def deviations(gain: float) -> tuple[np.ndarray, np.ndarray]:

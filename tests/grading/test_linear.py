@@ -106,7 +106,12 @@ def test_who_answers_otherwise_in_a_second_run_is_for_a_review_unless_a_relay(
 ) -> None:
     law = f"import os\ndef control(t, r, y, state, params):\n    return {voltage} + os.urandom(1)[0] / 1e4, state\n"
     found, _ = found_in(tmp_path, law)
-    assert isinstance(found, NoLoop) and found.is_known == is_known and "a seed" in found.why, found
+    assert isinstance(found, NoLoop) and found.is_known == is_known, found
+    assert ("switches" if is_known else "a seed") in found.why
+    if not is_known:  # what it is paid until somebody has looked
+        same, _ = found_in(tmp_path, law.replace("os.urandom(1)[0]", "0.0"))
+        assert isinstance(same, LinearLoop) and found.nearest is not None
+        assert found.nearest.margins == pytest.approx(same.margins, rel=0.03)
 
 
 @pytest.mark.parametrize("gain", [1e3, 1e6, 1e12, 1e300])

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from rds.grading.exports import one_submission
 from rds.grading.exports.one_submission import CONTAINERS, grade_in, main
+from rds.grading.intake.submissions import HandedIn, collect
 from rds.grading.sandbox import available
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
 from tests.grading.test_exports import GRADESCOPE, PRAIRIELEARN, hold_against
@@ -104,6 +106,22 @@ def test_a_pipe_is_what_the_student_handed_in_and_no_failure_of_the_grader(besid
     data = json.loads(grade_in("gradescope", root).read_text())
     assert data["score"] == pytest.approx(9.0 if beside else 0.0)
     assert beside or "it is a pipe (FIFO)" in data["output"]
+
+
+@pytest.mark.parametrize("folder", ["Abgaben/Lovelace_Ada_ada_1234", "Submissions/Team 3", "2026-01-05-10-12-33"])
+@pytest.mark.parametrize(("platform", "student"), [("gradescope", "ada@x.edu"), ("prairielearn", "variant-12345")])
+def test_nobody_is_another_student_by_the_names_of_folders(
+    platform: str, student: str, folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[HandedIn] = []
+    monkeypatch.setattr(one_submission, "run_batch", lambda task, given, *_, **__: found.extend(collect(given).rows))
+    root = container_in(tmp_path, platform)
+    handed_in = root / CONTAINERS[platform].submission
+    (handed_in / folder).mkdir(parents=True)
+    (handed_in / "my_controller.py").rename(handed_in / folder / "my_controller.py")
+    grade_in(platform, root)
+    assert [(row.student, row.name) for row in found] == [(student, "my_controller.py")]
+    assert (found[0].time is not None) is (platform == "gradescope")
 
 
 @pytest.mark.parametrize("platform", SCRIPTS)

@@ -322,6 +322,7 @@ AT_HOME = {
     "a window for pictures": "import matplotlib as m\nm.use('TkAgg')\nfrom matplotlib.pyplot import plot\nplot([1])\n",
     "an import for experiments": "from rds import Experiment, read_log\ndef plan(of): return Experiment(of)\n",
     "an import of all": "from rds import *\n",
+    "a language": "import locale\nlocale.setlocale(locale.LC_ALL, 'de_DE.UTF-8')\n",
 }
 
 

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
+from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -187,8 +189,8 @@ class _Work:
         self._failing: dict[str, list[tuple[UnitTest, str]]] = {}  # by criterion: its tests that do not pass
         self._untested: dict[str, str] = {}  # by criterion: why its tests came to no end
         self._stopped: Status | None = None
-        self._shares: dict[str, dict[str, float | None]] = {}  # of the points, by criterion and case; None: unknown
-        self._unknown: dict[str, str] = {}  # by criterion: why it could not be measured
+        self._shares: dict[str, dict[str, float]] = {}  # of the points, by criterion and case
+        self._unknown: dict[str, tuple[str, float]] = {}  # by criterion: why it could not be measured; most for it
 
     def go(self, path: Path, pool: Opener, is_hidden: bool) -> None:
         """Run what is visible, or what is hidden, of the cases and unit tests that the criteria need."""
@@ -239,8 +241,10 @@ class _Work:
         """SubmissionError where functions are handed in, and the file has none of those that are tested."""
         names = {test.function for criterion in self.assignment.criteria for test in criterion.tests}
         shown = sorted({t.function for c in self.assignment.criteria if not self._hides(c) for t in c.tests})
-        if self.assignment.kind == "functions" and names.isdisjoint(opened.functions().defines):
+        if self.assignment.kind == "functions" and names.isdisjoint(there := opened.functions().defines):
             said = ", ".join(f"{name}()" for name in shown) or "the functions that the assignment asks for"
+            close = ((own, name) for name in shown for own in get_close_matches(name, there, n=1, cutoff=0.7))
+            said += "".join(f"; it has {own}(); did you mean {name}()?" for own, name in islice(close, 1))
             raise SubmissionError(Status.FAILED_TO_LOAD, f"it defines none of what is asked for: {said}")
 
     def _run(self, case: Case, opened: Opened) -> None:
@@ -287,18 +291,19 @@ class _Work:
         for criterion in self.criteria:
             score = found[criterion.name]
             if score.band is Band.REVIEW:
-                found[criterion.name] = criterion.unknown(self._unknown[criterion.name], score.case, share)
+                why, most = self._unknown[criterion.name]
+                found[criterion.name] = criterion.unknown(why, score.case, min(share, most))
         return tuple(found.values())
 
     def _passes(self, name: str, cases: Sequence[str]) -> float:
         """How much of their points the criterion `name` leaves those that require it in these cases, 0 to 1.
 
         Where it is itself measured in some of the cases, these count, else all of its own. What could not be measured
-        leaves half: who makes a margin unmeasurable shall not be paid as if it were good.
+        leaves half at most: who makes a margin unmeasurable shall not be paid as if it were good.
         """
         shares = self._shares[name]
-        common = [shares[case] for case in cases if case in shares] or list(shares.values())
-        return min((UNKNOWN if share is None else min(share / GATE, 1.0) for share in common), default=1.0)
+        common = [shares[case] for case in cases if case in shares] or shares.values()
+        return min((min(share / GATE, 1.0) for share in common), default=1.0)
 
     def _ended(self) -> str:
         return self.reason if self._stopped is None else _ENDED.get(self._stopped, str(self._stopped))
@@ -310,6 +315,7 @@ class _Work:
         worst: tuple[float, str] | None = None
         nothing: tuple[str, str] | None = None
         unknown: tuple[str, str] | None = None
+        most = 1.0  # that what was seen would earn where it is unknown
         shares = self._shares.setdefault(criterion.name, {})
         for name in criterion.cases:
             case = self.assignment.case(name)
@@ -324,6 +330,9 @@ class _Work:
                     value = criterion.measure(run)
                 except NotKnown as error:
                     unknown = unknown or (str(error), name)
+                    seen = 1.0 if error.at_best is None else criterion.bands.share(error.at_best)
+                    most = min(most, seen)
+                    found.append(min(seen, UNKNOWN * GATE))
                     continue
                 except NotMeasured as error:
                     nothing = nothing or (str(error), name)
@@ -332,11 +341,11 @@ class _Work:
                 found.append(criterion.bands.share(value))
                 if worst is None or criterion.worse(value, worst[0]):
                     worst = value, name
-            shares[name] = min(found, default=None)
+            shares[name] = min(found)
         if nothing is not None:
             return criterion.nothing(*nothing)
         if unknown is not None and (worst is None or criterion.bands.band(worst[0]) is not Band.NONE):
-            self._unknown[criterion.name] = unknown[0]
+            self._unknown[criterion.name] = unknown[0], most
             return criterion.unknown(*unknown, 0.0)
         assert worst is not None  # every criterion has a case, every case a run
         return criterion.score(*worst)

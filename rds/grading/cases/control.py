@@ -179,13 +179,6 @@ class ControlCase:
             assert ideal is not None  # by `can_be_linearized`, which the assignment has checked
             u, y = done.result[f"{name}_command"], done.result[f"{name}_measured"]
             same = again.result[f"{name}_command"][:begin] == u[:begin]
-            if not same.all():
-                t = plan.T * int(np.argmin(same))
-                why = (
-                    f"at t = {t:.3f} s it answered the same samples otherwise in a second run; go by `t` and not by a "
-                    "clock, keep memory in `state`, and give generators of random numbers a seed"
-                )
-                return (NoLoop(why, switches(u, limit)),)
             # a relay where it is not measured, whatever it is elsewhere; or a law that shakes where nothing shakes it
             parts = [u[: stretch[0]], u[stretch[1] :], *([] if self.noise else [u])]
             if any(switches_again(each, limit) for each in parts):
@@ -195,7 +188,15 @@ class ControlCase:
             with np.errstate(over="ignore"):  # of voltages that no converter has
                 voltage = again.result[f"{name}_command"][part] - u[part]
             position = again.result[f"{name}_measured"][part] - y[part]
-            found.append(linear_loop(voltage, position, u[part], limit, ideal, plan.T))
+            loop = linear_loop(voltage, position, u[part], limit, ideal, plan.T)
+            if not same.all():
+                t = plan.T * int(np.argmin(same))
+                why = (
+                    f"at t = {t:.3f} s it answered the same samples otherwise in a second run; go by `t` and not by a "
+                    "clock, keep memory in `state`, and give generators of random numbers a seed"
+                )
+                loop = NoLoop(why, switches(u, limit), loop if isinstance(loop, LinearLoop) else loop.nearest)
+            found.append(loop)
         return tuple(found)
 
 

@@ -96,10 +96,14 @@ class LinearLoop:
 
 @dataclass(frozen=True)
 class NoLoop:
-    """Why there is no linearized loop. `is_known`: it was seen that there is none; else it could not be measured."""
+    """Why there is no linearized loop. `is_known`: it was seen that there is none; else it could not be measured.
+
+    `nearest` is then the loop of the linear law that departs least, by however much.
+    """
 
     why: str
     is_known: bool
+    nearest: LinearLoop | None = None
 
 
 def switches(command: np.ndarray, limit: float) -> bool:
@@ -134,6 +138,7 @@ def linear_loop(
         return NoLoop("a force on the axis moves nothing: how its voltage answers cannot be seen", False)
     if not np.any(voltage):
         return NoLoop("its voltage does not depend on the measured position: there is no loop", True)
+    nearest = None
     if np.isfinite(voltage).all():
         about = _Answer(voltage, position, command + voltage, limit, model, T)
         whole = about.best(slice(None), _PARTS)
@@ -148,9 +153,10 @@ def linear_loop(
             return unstable
         if loops:
             return min((loop for loop in loops if isinstance(loop, LinearLoop)), key=lambda loop: loop.margins[2])
+        nearest = about.nearest()
     if switches(command, limit):
         return NoLoop(SWITCHES, True)
-    return NoLoop("no linear law answers a force as it does, not even nearly", False)
+    return NoLoop("no linear law answers a force as it does, not even nearly", False, nearest)
 
 
 @dataclass(frozen=True)
@@ -185,6 +191,12 @@ class _Answer:
                 if (length := part.stop - part.start) >= _SHORTEST:
                     middle = part.start + length // 2
                     todo += [slice(part.start, middle), slice(middle, part.stop)]
+
+    def nearest(self) -> LinearLoop | None:
+        """The loop of the law that departs least, of those with a stable one."""
+        fits = sorted(law_fits(self.voltage, self.position), key=lambda fit: fit.departure)
+        loops = (closed(fit, self.model, self.T) for fit in fits)
+        return next((loop for loop in loops if isinstance(loop, LinearLoop)), None)
 
     def best(self, part: slice, parts: int) -> LinearLoop | NoLoop | None:
         """The loop of the law that fits this part; NoLoop where that is surely unstable; None where none fits."""

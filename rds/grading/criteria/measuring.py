@@ -27,7 +27,14 @@ class NotMeasured(RdsError):
 
 
 class NotKnown(NotMeasured):
-    """There may be a value, but it could not be measured: for a review, and no zero."""
+    """There may be a value, but it could not be measured: for a review, and no zero.
+
+    `at_best` is a value that what was seen comes near to: until the review it is not paid as if it were better.
+    """
+
+    def __init__(self, why: str, at_best: float | None = None):
+        super().__init__(why)
+        self.at_best = at_best
 
 
 def over_axes(run: CaseRun, of: Callable[[str], float], worst: Callable[..., float] = max) -> float:
@@ -129,6 +136,9 @@ def over_loops(run: CaseRun, of: Callable[[Any], float], worst: Callable[[Iterab
     missing = [loop for loop in loops if isinstance(loop, NoLoop)]
     if known := next((loop for loop in missing if loop.is_known), None):
         raise NotMeasured(known.why)
+    nearest = [loop.nearest if isinstance(loop, NoLoop) else loop for loop in loops]
+    value = float(worst(of(loop) for loop in nearest if loop is not None)) if any(nearest) else None
     if missing:
-        raise NotKnown(missing[0].why)
-    return float(worst(of(loop) for loop in loops))
+        raise NotKnown(missing[0].why, value)
+    assert value is not None  # every case has an axis
+    return value

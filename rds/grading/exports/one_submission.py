@@ -85,7 +85,8 @@ def _grade(container: Container, platform: str, root: Path, target: Path) -> Non
     student, time = container.who(about)
     student = student.replace("/", "_") or "student"
     with scratch("one") as work:
-        folder = work / "submissions" / student
+        # one folder more: none of the student's own is called as a platform's would be, and makes a student of its name
+        folder = work / "submissions" / student / "submission"
         given = root / container.submission
         shutil.copytree(given, folder, symlinks=True, copy_function=_copied, ignore=partial(_too_deep, given))
         if time:

@@ -31,14 +31,14 @@ def isolated(text: str, most: int = 200) -> str:
 
 
 def cell(text: str) -> str:
-    """Text for a table that a spreadsheet may open: nothing in it is taken for a formula."""
+    """Text for a table that a spreadsheet may open: nothing in it is taken for a formula, as after blanks by some."""
     text = plain(text)
-    return f"'{text}" if text.lstrip("'").startswith(_FORMULA) else text
+    return f"'{text}" if text.lstrip("' ").startswith(_FORMULA) else text
 
 
 def uncell(text: str) -> str:
     """What `cell` was given, of a text without anything that cannot be printed."""
-    return text[1:] if text.startswith("'") and text.lstrip("'").startswith(_FORMULA) else text
+    return text[1:] if text.startswith("'") and text.lstrip("' ").startswith(_FORMULA) else text
 
 
 def csv_line(cells: Iterable[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import importlib.util
+import locale
 import random
 import sys
 from collections.abc import Callable
@@ -76,8 +77,18 @@ def _seed() -> None:
 def _as_at_home() -> None:
     """What a file says for its author's own computer, and none of its functions needs, does no harm here.
 
-    Such is the choice of a window for pictures, and the import of what runs experiments, which is not mounted.
+    Such is the choice of a window for pictures, that of a language, whose data are not mounted, and the import of what
+    runs experiments, which is not mounted either.
     """
+    set_language = locale.setlocale
+
+    def set_if_there(category: int, name: Any = None) -> str:
+        try:
+            return set_language(category, name)
+        except locale.Error:
+            return set_language(category)
+
+    vars(locale)["setlocale"] = set_if_there
     if "matplotlib" in sys.modules:
         vars(sys.modules["matplotlib"])["use"] = lambda *_, **__: None
     package = vars(sys.modules["rds"])
