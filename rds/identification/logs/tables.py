@@ -154,6 +154,12 @@ FORMATS: tuple[DataFormat, ...] = (  # the first that a file is of reads it
     DataFormat("a bus log", (*_OF_FRAMES, ".gz"), _read_can),
     DataFormat("a bus log", TEXTS, _read_can, _is_of_bus),
     DataFormat("a trace of CODESYS", TEXTS, _late("codesys_table", "read_trace"), _late("codesys_table", "is_trace")),
+    DataFormat(
+        "a measurement of LabVIEW",
+        TEXTS,
+        _late("labview_table", "read_labview"),
+        _late("labview_table", "is_labview"),
+    ),
     DataFormat("columns of text", TEXTS, _read_csv),
     DataFormat("vectors of MATLAB", (".mat",), _late("other_tables", "read_mat")),
     DataFormat("numeric columns", (".parquet",), _late("other_tables", "read_parquet")),
