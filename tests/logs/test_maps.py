@@ -49,7 +49,7 @@ def saved(folder: Path, text: str) -> Path:
         (MAP + "force_gain = 0.0\n", 8, "make no force"),
         (MAP + 'closed_loop = "yes"\n', 8, "must be true or false"),
         ('gaps = "fill"\n' + MAP, 1, "known: refuse, split, keep"),
-        ("jitter_limit = 2.0\n" + MAP, 1, "from 0 to 0.5"),
+        ("jitter_limit = 2.0\n" + MAP, 1, "from 0 to 1"),
         ('machine = "mini-cnx"\n' + MAP, 1, "there is no machine 'mini-cnx'"),
         (MAP.replace("[axis.X]", "[axes.X]"), None, "no [axis.NAME] table"),
         (MAP.replace("command = ", "comand = "), 5, "axis X needs command"),

@@ -48,6 +48,25 @@ def test_a_log_that_begins_with_its_step_is_no_fault() -> None:
     assert found.parameters["friction_plus"].value == pytest.approx(FRICTION, rel=0.05)
 
 
+def test_steps_from_rest_are_no_fault_however_coarse_the_encoder_and_one_that_rests_is_none_beside_them() -> None:
+    """Degrees counted every 6 ms: a window's speed leaps by 80 deg/s. Friction holds the axis at the least level."""
+    made, period = structure("axis", output="deg", command="%"), 0.0062
+    truth = {"tau": 0.11, "K": 6.8, "friction_plus": 140.0, "friction_minus": -50.0}
+    t = np.arange(160) * period
+    logs = []
+    for level in (20.0, 40.0, 60.0, 100.0, -20.0, -60.0):
+        y = np.floor(made.respond(t, np.full(160, level), (0.2, 0.0), truth))
+        units = {"position": "deg", "command": "%"}
+        logs.append(with_findings(Log(f"{level:g}", t, np.full(160, level), y, units=units, closed_loop=False)))
+    (rests, *others) = [said(log, "excitation")[0] for log in logs]
+    assert rests.gravity is Gravity.FAULT and "excites nothing" in rests.what
+    assert all(found.gravity is Gravity.WARNING and "begins with its step" in found.what for found in others)
+    found = fit(logs, made)
+    assert not found.unusable() and not any("contradict" in warning for warning in found.warnings)
+    assert found.parameters["K"].value == pytest.approx(6.8, rel=0.02)
+    assert found.parameters["friction_minus"].value == pytest.approx(-50.0, rel=0.1)
+
+
 def test_one_step_alone_tells_gain_and_friction_together_only() -> None:
     found = fit([speed_log(np.full(120, 8.0))], structure("axis"))
     assert any("K" in sentence and "friction_plus" in sentence for sentence in found.unidentifiable)

@@ -16,6 +16,7 @@ import numpy as np
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.residuals import effective_samples
 from rds.identification.fit.solve import Solution
+from rds.identification.logs.excitation import is_at_rest
 
 _APART = 6.0  # standard errors of both, of which a linear step makes too little
 _MATTERS = 0.03  # of the value: contradictions that are smaller mean nothing to a loop
@@ -34,6 +35,7 @@ def contradictions(problem: Problem, solution: Solution) -> Iterator[str]:
             (i, value[at], error[at])
             for i, (value, error) in enumerate(alone)
             if error[at] <= _SURE * size and abs(value[at] - both_say) <= size  # farther no linear step goes
+            if not is_at_rest(problem.logs[i])
         ]
         pairs = [
             (abs(a - b) / spread, (i, a), (j, b))
