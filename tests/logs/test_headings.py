@@ -170,6 +170,7 @@ def test_headings_of_several_words_stand_two_blanks_apart(tmp_path: Path) -> Non
         ("t u x\n[ 1 2 3;\n" + " 1 2 3;\n" * 30, r"tr -d '\[\];' "),
         ("t,u,x\n" + "\x001,2,3\n" * 30, r"30 null bytes .*tr -d '\\000'"),
         ('t,u,x\n1,"2\n",3\n' + '1,"3\n",3\n' * 30, "goes on in the next line.*pandas"),
+        ("  can0  080   [0]\n" + "  can0  609   [8]  40 77 60 00 00 00 00 00\n" * 30, "candump has written no times"),
         ("Name a b c\nSymbolComment   \nData-Type R R R\n" + "1 2 3 4\n" * 30, "blanks stand between its cells"),
     ],
 )

@@ -67,6 +67,18 @@ def test_steps_from_rest_are_no_fault_however_coarse_the_encoder_and_one_that_re
     assert found.parameters["friction_minus"].value == pytest.approx(-50.0, rel=0.1)
 
 
+def test_a_log_of_one_level_does_not_contradict_another_about_friction() -> None:
+    """By itself it tells gain and friction together only; each was given an error many times too small."""
+    bend = {3.0: 8.0, 5.0: 14.0, 8.0: 15.0, 12.0: 11.0}  # rev/min: friction that is not the structure's
+    steps = []
+    for level, friction in bend.items():
+        command = np.r_[np.zeros(20), np.full(200, level)]
+        log = speed_log(command + np.where(command > 0.0, (FRICTION - friction) / K, 0.0), name=f"{level:g} V")
+        steps.append(with_findings(Log(log.name, log.time, command, log.position, units=log.units, closed_loop=False)))
+    warnings = fit(steps, structure("axis")).warnings
+    assert not any("contradict each other about friction" in warning for warning in warnings)
+
+
 def test_one_step_alone_tells_gain_and_friction_together_only() -> None:
     found = fit([speed_log(np.full(120, 8.0))], structure("axis"))
     assert any("K" in sentence and "friction_plus" in sentence for sentence in found.unidentifiable)

@@ -61,7 +61,8 @@ _EXPORTS = {
     ".fig": "a figure of MATLAB: save the vectors that it shows as a MAT file",
 }
 _OF_BUS = re.compile(
-    rb"timestamp,arbitration_id,|time ?stamp,\s*id,\s*extended,|\s*\([\d. :-]{3,30}\)\s+\S+\s+[\dA-F]+(?:#|\s+\[)",
+    rb"timestamp,arbitration_id,|time ?stamp,\s*id,\s*extended,|\s*\([\d. :-]{3,30}\)\s+\S+\s+[\dA-F]+(?:#|\s+\[)|"
+    rb"\s+\S+\s+[\dA-F]{3,8}\s+\[\d+\]",  # candump without times, which its reader refuses
     re.IGNORECASE,
 )
 
