@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil
 
 import numpy as np
 
-from rds.identification.logs.log import Finding, Gravity, Log
+from rds.identification.logs.log import Finding, Gravity, Log, excited_part
 from rds.identification.logs.motion import motion, noise, travel
 from rds.machines.machine import Axis
 
@@ -81,6 +82,14 @@ def has_one_level(log: Log) -> bool:
     """Whether the command changes and has one level in each direction: its steady speeds tell no gain by themselves."""
     command = log.command
     return bool(np.ptp(command) > 0.0) and _levels(command, 1.0) <= 1 and _levels(command, -1.0) <= 1
+
+
+def steps_to_one_level(logs: Sequence[Log]) -> bool:
+    """Whether each log goes from rest to one level of command and stays there, and all go to the same: one speed."""
+    after = [excited_part(log, len(log)).command[1:] for log in logs]
+    largest = max(float(np.abs(command).max(initial=0.0)) for command in after)
+    before = [log.command[0] if np.ptp(log.command) else 0.0 for log in logs]
+    return not any(before) and float(np.ptp(np.concatenate(after))) <= _LEVEL * largest
 
 
 def is_steady(log: Log) -> bool:

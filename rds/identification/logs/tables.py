@@ -191,6 +191,7 @@ def read_table(
         found = next(fitting, None)
         if found is None:
             told = f"it is {_EXPORTS[ending]}. Read" if ending in _EXPORTS else "known"
+            told = told if ending else f"let the name of a table of text end in .csv; {told}"
             raise InputError(f"there is no log of the ending {ending!r}; {told}: {', '.join(endings())}")
         table = found.read(path, asked)
         unprintable = next((name for name in table.columns if not name.isprintable()), None)

@@ -47,7 +47,7 @@ _PLAYS = (2.0, 6.0)  # times the residual: widths of a play that is tried
 _FAR_MORE = 0.5  # of the residual, at most, where play is what it lacks
 _CHANCE = 0.01
 _TOLD = 1.0  # %: standard error of a gain that the log tells
-_ANY = 100.0  # %: the same, of a gain of which it tells nothing
+_ANY = 20.0  # %: the same, of a gain of which it tells next to nothing
 _SAME = 0.1  # %: gains that differ by less are one
 _LINEAR = {"tau", "K", "friction_plus", "friction_minus"}
 
