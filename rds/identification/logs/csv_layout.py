@@ -50,6 +50,7 @@ _FEW_NULLS = 0.2  # share of a text's bytes
 _OTHER_UNITS = re.compile(
     r"k?W|[°]?C|Deg C|degC|k?Hz|k?g|kgf|J|[AW]h|M?Pa|bar|N[.*]mm|(m|rad|deg)/s(\^2|²|2)|#|[kM]?Ohm|Ω"
 )
+_TIME_NAMES = ("time", "zeit", "date")
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
 
 
@@ -453,6 +454,7 @@ def _seem_units(cells: Sequence[str], names: Sequence[str], decimal: str) -> boo
     known = sum(dimension(cell.strip("[]() ")) is not None for cell in given)
     other = sum(_OTHER_UNITS.fullmatch(cell.strip("[]() ")) is not None for cell in given)
     words = all(not is_number(cell, decimal) for cell in (*cells, *names)) and all(names)
+    words &= not any(cell.casefold().startswith(_TIME_NAMES) for cell in given)  # a row of names below a title
     return words and known > 0 and 2 * (known + other) >= len(given)
 
 
