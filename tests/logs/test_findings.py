@@ -167,6 +167,28 @@ def test_beyond_the_limit_the_first_sample_is_named(tmp_path: Path, at: int) -> 
     assert len(read(tmp_path, made, "jitter_limit = 0.2\n")) == 4000
 
 
+def test_times_of_a_slow_loop_are_taken_as_they_are_where_the_map_says_so(tmp_path: Path) -> None:
+    made = axis()
+    made["time"][1000:1003] += [0.63e-3, 0.05e-3, 0.0]  # a late sample, and one right behind it
+    with pytest.raises(InputError, match=r"a larger jitter_limit in the map \(at most 1\)"):
+        read(tmp_path, made)
+    log = read(tmp_path, made, "jitter_limit = 1.0\n")
+    (jitter,) = [finding for finding in log.findings if finding.kind == "jitter"]
+    assert len(log) == 4000 and jitter.gravity is Gravity.WARNING
+    made = axis()
+    made["time"][1000:1003] += [2.0e-3, 1.1e-3, 0.2e-3]
+    with pytest.raises(InputError, match='gaps = "keep" in the map'):
+        read(tmp_path, made, "jitter_limit = 1.0\n")
+    assert len(read(tmp_path, made, 'jitter_limit = 1.0\ngaps = "keep"\n')) == 4000
+
+
+def test_rows_that_are_left_from_before_the_recording_are_to_be_removed(tmp_path: Path) -> None:
+    made = axis()
+    made["time"][0] = 1.074
+    with pytest.raises(InputError, match=r"the first row of data is left from before .* remove it"):
+        read(tmp_path, made)
+
+
 @pytest.mark.parametrize(("late", "said"), [([0.8e-3], "80 %"), ([2.0e-3, 1.1e-3, 0.2e-3], "200 %")])
 def test_samples_that_came_late_are_not_missing(tmp_path: Path, late: list[float], said: str) -> None:
     """They were told as a gap, and as samples in which the command was to be taken as held."""

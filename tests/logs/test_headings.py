@@ -116,6 +116,73 @@ def test_a_scope_with_a_time_for_each_channel(tmp_path: Path) -> None:
     assert len(log) == 400 and np.allclose(log.command, np.sin(0.03 * (T // 2 * 2)), atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("head", "stamp"),
+    [
+        ("Name;ActPos;CmdVolt\nSymbolComment;;\nSampleTime[ms];1;1\nOffset;0;0\nUnit;mm;V\n\n", 0),
+        ("Name;ActPos;CmdVolt\nUnit;mm;V\n", 132959733843760000),  # full stamps: FILETIME, in steps of 100 ns
+    ],
+)
+def test_a_scope_with_one_time_for_all_channels(head: str, stamp: int, tmp_path: Path) -> None:
+    """TwinCAT's times are in ms, whether its head says the sample time or the names alone."""
+    above = "Name;Scope;\nFile;C:\\a.svdx;\nStarttime of export;132959733843760000;Montag;15:56:24.376\n\n"
+    path = tmp_path / "a.csv"
+    rows = [f"{stamp + k * (10000 if stamp else 1)};{X[k]:.6f};{U[k]:.6f}" for k in T]
+    path.write_text(above + head + "\n".join(rows) + "\n", encoding="utf-8")
+    (log,) = read_log(path)
+    assert np.allclose(log.time - log.time[0], T / 1e3, atol=3e-6)
+    assert np.allclose(log.position, X, atol=1e-6) and np.allclose(log.command, U, atol=1e-6)
+
+
+def test_a_row_of_units_of_which_some_are_unknown_costs_no_name(tmp_path: Path) -> None:
+    head = "2024-03-02 09:00:00\nTime, Input voltage, Motor temperature, Torque, Speed\ns, V, Deg C, N.mm, rad.s\n"
+    table = read_table(written(tmp_path, "a.csv", head, [T, U, U, X, X], ", "))
+    assert [column.unit for column in table.columns.values()] == ["s", "V", "Deg C", "N.mm", "rad.s"]
+    assert list(table.columns)[1:3] == ["Input voltage", "Motor temperature"]
+    table = read_table(written(tmp_path, "b.csv", "Motor,Test,Run\ntime,V,A\n", [T, U, X], ","))
+    assert list(table.columns) == ["time", "V", "A"]  # names below a title
+
+
+def test_a_first_row_of_nan_is_no_heading(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("%t,u,x\n%[s],[V],[mm]\nnan,nan,nan\n" + "".join(f"{k},{k % 7},{2 * k}\n" for k in T))
+    table = read_table(path)
+    assert {column.name: column.unit for column in table.columns.values()} == {"t": "s", "u": "V", "x": "mm"}
+    assert len(table.columns["x"].values) == 401 and np.isnan(table.columns["x"].values[0])
+
+
+def test_numbers_of_motors_in_brackets_are_no_units(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path, "a.csv", "t_s,pos (1),load (1),pos (2),load (2)\n", [T, X, U, X, U], ","))
+    assert [column.unit for column in table.columns.values()] == ["s", None, None, None, None]
+    assert list(table.columns)[1:] == ["pos (1)", "load (1)", "pos (2)", "load (2)"]
+    table = read_table(written(tmp_path, "b.csv", "t_s,pos [mm],duty [1]\n", [T, X, U], ","))
+    assert table.columns["duty"].unit == "1"
+
+
+def test_headings_of_several_words_stand_two_blanks_apart(tmp_path: Path) -> None:
+    head = " Sample   Time     Commanded Pos   Encoder 1 Pos\n\n"
+    table = read_table(written(tmp_path, "a.txt", head, [T, T, X, X], "   "))
+    assert list(table.columns) == ["Sample", "Time", "Commanded Pos", "Encoder 1 Pos"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,u,x\n" + "1,2,3;\n" * 30, r"tr -d ';' "),
+        ("t u x\n[ 1 2 3;\n" + " 1 2 3;\n" * 30, r"tr -d '\[\];' "),
+        ("t,u,x\n" + "\x001,2,3\n" * 30, r"30 null bytes .*tr -d '\\000'"),
+        ('t,u,x\n1,"2\n",3\n' + '1,"3\n",3\n' * 30, "goes on in the next line.*pandas"),
+        ("  can0  080   [0]\n" + "  can0  609   [8]  40 77 60 00 00 00 00 00\n" * 30, "candump has written no times"),
+        ("Name a b c\nSymbolComment   \nData-Type R R R\n" + "1 2 3 4\n" * 30, "blanks stand between its cells"),
+    ],
+)
+def test_what_would_cost_columns_is_refused_with_its_remedy(text: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        read_table(path)
+
+
 @pytest.mark.parametrize("head", ["time_ms;u_V;x_mm\n", "time_ms;u_V;x_mm;\n"])
 def test_a_delimiter_may_end_the_rows_and_not_the_heading(head: str, tmp_path: Path) -> None:
     (log,) = read_log(written(tmp_path, "a.csv", head, [T, U, X], ";", ";"))

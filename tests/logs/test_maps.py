@@ -49,7 +49,7 @@ def saved(folder: Path, text: str) -> Path:
         (MAP + "force_gain = 0.0\n", 8, "make no force"),
         (MAP + 'closed_loop = "yes"\n', 8, "must be true or false"),
         ('gaps = "fill"\n' + MAP, 1, "known: refuse, split, keep"),
-        ("jitter_limit = 2.0\n" + MAP, 1, "from 0 to 0.5"),
+        ("jitter_limit = 2.0\n" + MAP, 1, "from 0 to 1"),
         ('machine = "mini-cnx"\n' + MAP, 1, "there is no machine 'mini-cnx'"),
         (MAP.replace("[axis.X]", "[axes.X]"), None, "no [axis.NAME] table"),
         (MAP.replace("command = ", "comand = "), 5, "axis X needs command"),
@@ -277,3 +277,15 @@ def test_a_draft_knows_what_was_wanted_from_what_was_measured(
     path.write_text("\n".join([",".join(headings), *rows]) + "\n", encoding="utf-8")
     (axis,) = tomllib.loads(draft(read_table(path)))["axis"].values()
     assert {quantity: column["column"] for quantity, column in axis.items()} == expected
+
+
+@pytest.mark.parametrize(("scale", "warned"), [(1.0, True), (0.001, False)])
+def test_a_scale_that_converts_the_file_s_unit_is_no_contradiction(scale: float, warned: bool, tmp_path: Path) -> None:
+    made = axis(400)
+    head = {"time [s]": made["time"], "voltage [V]": made["voltage"], "position [mm]": made["position"]}
+    path = write(tmp_path / "log.csv", head)
+    said = MAP.replace('column = "position", unit = "mm"', f'column = "position", unit = "m", scale = {scale}')
+    (log,) = read_log(path, saved(tmp_path, said))
+    assert any("the map was followed" in finding.what for finding in log.findings) == warned
+    if not warned:
+        assert np.allclose(log.position, made["position"])

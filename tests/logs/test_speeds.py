@@ -48,6 +48,37 @@ def test_a_log_that_begins_with_its_step_is_no_fault() -> None:
     assert found.parameters["friction_plus"].value == pytest.approx(FRICTION, rel=0.05)
 
 
+def test_steps_from_rest_are_no_fault_however_coarse_the_encoder_and_one_that_rests_is_none_beside_them() -> None:
+    """Degrees counted every 6 ms: a window's speed leaps by 80 deg/s. Friction holds the axis at the least level."""
+    made, period = structure("axis", output="deg", command="%"), 0.0062
+    truth = {"tau": 0.11, "K": 6.8, "friction_plus": 140.0, "friction_minus": -50.0}
+    t = np.arange(160) * period
+    logs = []
+    for level in (20.0, 40.0, 60.0, 100.0, -20.0, -60.0):
+        y = np.floor(made.respond(t, np.full(160, level), (0.2, 0.0), truth))
+        units = {"position": "deg", "command": "%"}
+        logs.append(with_findings(Log(f"{level:g}", t, np.full(160, level), y, units=units, closed_loop=False)))
+    (rests, *others) = [said(log, "excitation")[0] for log in logs]
+    assert rests.gravity is Gravity.FAULT and "excites nothing" in rests.what
+    assert all(found.gravity is Gravity.WARNING and "begins with its step" in found.what for found in others)
+    found = fit(logs, made)
+    assert not found.unusable() and not any("contradict" in warning for warning in found.warnings)
+    assert found.parameters["K"].value == pytest.approx(6.8, rel=0.02)
+    assert found.parameters["friction_minus"].value == pytest.approx(-50.0, rel=0.1)
+
+
+def test_a_log_of_one_level_does_not_contradict_another_about_friction() -> None:
+    """By itself it tells gain and friction together only; each was given an error many times too small."""
+    bend = {3.0: 8.0, 5.0: 14.0, 8.0: 15.0, 12.0: 11.0}  # rev/min: friction that is not the structure's
+    steps = []
+    for level, friction in bend.items():
+        command = np.r_[np.zeros(20), np.full(200, level)]
+        log = speed_log(command + np.where(command > 0.0, (FRICTION - friction) / K, 0.0), name=f"{level:g} V")
+        steps.append(with_findings(Log(log.name, log.time, command, log.position, units=log.units, closed_loop=False)))
+    warnings = fit(steps, structure("axis")).warnings
+    assert not any("contradict each other about friction" in warning for warning in warnings)
+
+
 def test_one_step_alone_tells_gain_and_friction_together_only() -> None:
     found = fit([speed_log(np.full(120, 8.0))], structure("axis"))
     assert any("K" in sentence and "friction_plus" in sentence for sentence in found.unidentifiable)
@@ -186,3 +217,33 @@ def test_a_speed_tells_its_direction_by_its_sign_and_has_no_end_stop(unit: str) 
     limited = with_findings(Log("limited", t, u, np.round(0.6 * u, 2), units=units))
     assert not any("end stop" in finding.what for finding in limited.findings)
     assert {axes.get_ylabel() for axes in overview([limited]).axes} >= {f"speed [{unit}]"}
+
+
+def test_a_log_that_tells_no_gain_tells_no_delay_however_far_the_search_goes() -> None:
+    """At the edge of the search a delay has no slope, and was told to the last digit: 177 ms too long, ± 0 ms."""
+    k = np.arange(450)
+    t = 0.02 * k
+    y = np.round((30.0 + 8.0 * (k // 50)) / 1.07) * 1.07  # a controller's stairs, under a voltage that hardly changes
+    units = {"position": "rev/min", "command": "V"}
+    log = Log("stairs", t, 0.2 + np.minimum(t, 1.4), y, units=units, closed_loop=True)
+    model = {"tau": 0.039, "K": 26.8, "friction_plus": 6.1, "friction_minus": -6.1, "delay": 0.017}
+    found = as_axis(Candidate("model", structure("axis", ("delay",), "rev/min"), model), log, 0.36)
+    assert found is not None and found.gain.error > 20.0 and found.delay is not None and found.delay.error == np.inf
+
+
+def test_one_speed_tells_no_gain_though_a_few_samples_at_rest_seem_to_tell_friction() -> None:
+    """A measured step of 5.24 ± 0.04 V whose first two samples turn: K was 0.3 % sure, and any K does as well."""
+    k = np.arange(1200)
+    draw = np.random.default_rng(3)
+    command = np.where(k > 0, 5.24 + 0.04 * (draw.random(1200) < 0.03), 0.0)
+    made, truth = structure("axis", ("delay",), "rev/min"), {"tau": 0.1, "K": 60.0, "delay": 0.33}
+    truth |= {"friction_plus": 65.0, "friction_minus": -65.0}
+    y = made.respond(0.004 * k, command, (0.0,), truth) + 2.0 * draw.standard_normal(1200) * (k > 83)
+    y[:2] = 1.9  # still turning, without friction as it seems
+    y[2:12] = 1.9 * np.exp(-0.004 * k[2:12] / 0.1)
+    log = Log("step", 0.004 * k, command, np.round(y / 1.91) * 1.91, units={"position": "rev/min", "command": "V"})
+    found = fit([with_findings(log)], made)
+    gain = found.parameters["K"]
+    assert gain.low <= 60.0 <= gain.high
+    held = fit([with_findings(log)], made, options={"fixed": {"friction_plus": 65.0, "friction_minus": -65.0}})
+    assert held.parameters["K"].value == pytest.approx(60.0, rel=0.01) and held.parameters["K"].std_error < 0.5

@@ -16,9 +16,11 @@ import numpy as np
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.residuals import effective_samples
 from rds.identification.fit.solve import Solution
+from rds.identification.logs.excitation import is_at_rest
 
 _APART = 6.0  # standard errors of both, of which a linear step makes too little
 _MATTERS = 0.03  # of the value: contradictions that are smaller mean nothing to a loop
+_WHOLE = 1.0 - 1e-3  # of a parameter that a log tells by itself, and not only together with another one
 _SURE = 0.2  # of the value: a log whose error is larger does not say
 
 
@@ -34,6 +36,7 @@ def contradictions(problem: Problem, solution: Solution) -> Iterator[str]:
             (i, value[at], error[at])
             for i, (value, error) in enumerate(alone)
             if error[at] <= _SURE * size and abs(value[at] - both_say) <= size  # farther no linear step goes
+            if not is_at_rest(problem.logs[i])
         ]
         pairs = [
             (abs(a - b) / spread, (i, a), (j, b))
@@ -63,8 +66,9 @@ def _alone(problem: Problem, solution: Solution, number: int) -> tuple[np.ndarra
     left = error - J @ step
     variance = float(left @ left) / max(effective_samples(left), 1.0)
     inverse = np.linalg.pinv(J.T @ J, rcond=1e-12)
+    told = np.diag(inverse @ (J.T @ J)) > _WHOLE
     for column, place in enumerate(np.flatnonzero(used).tolist()):
-        if place < n:
+        if place < n and told[column]:
             values[place] += step[column] / scale[place]
             errors[place] = float(np.sqrt(max(variance * inverse[column, column], 0.0))) / scale[place]
     return values, errors

@@ -12,7 +12,7 @@ from rds.identification.fit.estimate import UNUSABLE, Errors
 from rds.identification.fit.initial_state import first_velocities, initial_samples
 from rds.identification.fit.kstep import over_noise
 from rds.identification.fit.smoothing import Motion, motion_of
-from rds.identification.logs.excitation import is_steady
+from rds.identification.logs.excitation import is_at_rest, is_steady
 from rds.identification.logs.log import RATES
 from rds.identification.logs.motion import travel
 from rds.identification.structures.structure import Structure
@@ -126,6 +126,9 @@ def _too_small(log: Log, way: str, reach: float, how: str, noise: float, unit: s
 
 
 def _poor(log: Log, motion: Motion, error: np.ndarray, is_open: bool = True) -> list[str]:
+    if is_at_rest(log):  # there is no motion to explain
+        moved, unit = float(np.ptp(error)), log.units.get("position", "mm")
+        return [f"{log.name}: the axis rests there, and the model moves by {moved:.3g} {unit}"] if moved > 0.0 else []
     spread = float(log.position.std())
     fit = 100.0 * (1.0 - float(error.std()) / spread) if spread > 0.0 else 0.0
     if not (fit < _POOR and _rms(error) > MISSED * motion.noise) or (log.is_rate and is_steady(log)):

@@ -17,7 +17,7 @@ from rds.identification.fit.free_run_doubts import held_doubts, leap_doubts, oth
 from rds.identification.fit.initial_state import estimate_start, initial_samples
 from rds.identification.fit.kstep import ahead, errors_of
 from rds.identification.fit.smoothing import speed_range
-from rds.identification.logs.excitation import is_steady
+from rds.identification.logs.excitation import is_at_rest, is_steady
 from rds.identification.logs.fingerprint import fingerprint
 from rds.identification.logs.log import Gravity, Log
 from rds.identification.logs.motor_constant import UNKNOWN
@@ -117,7 +117,7 @@ def made_estimate(
 def _of_logs(logs: Sequence[Log]) -> list[str]:
     """Faults and warnings about the logs, each once with the names of those that have it.
 
-    A log of a steady speed, which tells nothing by itself, is no fault beside others that have none.
+    A log of a steady speed or at rest, which tells nothing by itself, is no fault beside others that have none.
     """
     are_whole = any(all(finding.gravity is not Gravity.FAULT for finding in log.findings) for log in logs)
     faults: dict[str, list[str]] = {}
@@ -125,7 +125,8 @@ def _of_logs(logs: Sequence[Log]) -> list[str]:
     for log in logs:
         for finding in log.findings:
             is_fault = finding.gravity is Gravity.FAULT
-            if is_fault and not (are_whole and finding.kind == "excitation" and is_steady(log)):
+            beside = are_whole and finding.kind == "excitation" and (is_steady(log) or is_at_rest(log))
+            if is_fault and not beside:
                 faults.setdefault(finding.what, []).append(log.name)
             elif is_fault or finding.gravity is Gravity.WARNING:
                 warned.setdefault(finding.what, []).append(log.name)

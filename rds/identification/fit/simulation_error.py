@@ -30,6 +30,7 @@ from rds.identification.fit.solve import EVALUATIONS, first_state
 from rds.identification.fit.suspicions import suspicions
 from rds.identification.fit.uncertainty import Uncertainty, uncertainty_of
 from rds.identification.fit.unidentifiable import unidentifiable_by
+from rds.identification.logs.excitation import steps_to_one_level
 from rds.identification.logs.log import Log
 from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Start, Structure
@@ -82,6 +83,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         left = solution.step[:free][:, None]
         covariance[np.ix_(places, places)] += left @ left.T
     open_ended = _widen(covariance, order, logs, structure, holding, found, uncertainty)
+    open_ended += [name for name in _of_one_speed(logs, problem, covariance, order) if name not in open_ended]
     for name in (*found.unmoved, *open_ended):
         covariance[order.index(name), :] = covariance[:, order.index(name)] = 0.0
         covariance[order.index(name), order.index(name)] = np.inf
@@ -143,6 +145,18 @@ def _widen(
     scale = np.array([factors.get(name, 1.0) if name not in open_ended else 1.0 for name in order])
     covariance *= np.outer(scale, scale)
     return open_ended
+
+
+def _of_one_speed(logs: Sequence[Log], problem: Problem, covariance: np.ndarray, order: Sequence[str]) -> list[str]:
+    """Gain and friction, where one steady speed is all that tells them: only what they make together is known.
+
+    A few samples at rest, or the noise of a measured command, seem to part them, and derivatives there promise a gain
+    that none of the data determine.
+    """
+    together = [name for name in problem.names if name == "K" or name.startswith("friction")]
+    if "K" not in together or len(together) == 1 or not steps_to_one_level(logs):
+        return []
+    return [name for name in together if np.isfinite(covariance[order.index(name), order.index(name)])]
 
 
 def _starts(

@@ -15,7 +15,6 @@ Each sample has its time stamp. The bit 16 of `Flags` says that stamps are in ms
 
 from __future__ import annotations
 
-import codecs
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +23,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.limits import read_limited
-from rds.identification.logs.csv_cells import BLANKS
+from rds.identification.logs.csv_cells import BLANKS, decoded
 from rds.identification.logs.log import Finding
 from rds.identification.logs.table import Column, Table
 from rds.identification.logs.units import factor, unit_of_name
@@ -39,7 +38,7 @@ _WORDS = {"true": 1.0, "false": 0.0, **dict.fromkeys(BLANKS, np.nan)}
 def is_trace(path: Path) -> bool:
     """Whether a text file is such a trace."""
     with open(path, "rb") as stream:
-        return _HEAD.match(_text(stream.read(64))) is not None
+        return _HEAD.match(decoded(stream.read(64))) is not None
 
 
 def read_trace(path: Path) -> Table:
@@ -49,7 +48,7 @@ def read_trace(path: Path) -> Table:
     sampled at different times in a unit that the file does not give.
     """
     remedy = "save a shorter trace, or the recorded variables alone"
-    lines = _text(read_limited(path, _MOST, "a trace", remedy)).splitlines()
+    lines = decoded(read_limited(path, _MOST, "a trace", remedy)).splitlines()
     flags, stamps = 0, []
     values: list[float] = []
     found: dict[str, tuple[list[float], list[float]]] = {}  # stamps and values by variable
@@ -111,16 +110,6 @@ def _timed(columns: dict[str, Column], flags: int, path: Path) -> dict[str, Colu
             raise InputError(f"time stamps of variable {name!r} are repeated, or go back; record it again", str(path))
     second = factor(unit, "s")
     return {n: replace(c, time=c.time * second) for n, c in columns.items() if c.time is not None}
-
-
-def _text(data: bytes) -> str:
-    """The text, of whichever coding: UTF-8 or 16 by its mark, else Windows' code page 1252 where it is no UTF-8."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16", "replace")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", "replace")
 
 
 def _number(cell: str) -> float | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isclose
+
 import numpy as np
 
 from rds.core.errors import InputError
@@ -50,6 +52,14 @@ def column_time(table: Table, about: TimeMap) -> np.ndarray:
     return values
 
 
+def _is_same(unit: str, about: ColumnMap) -> bool:
+    """Whether a file's unit is the map's, or the map's `scale` converts the one to the other."""
+    named = about.unit or ""
+    if plain(named) == plain(unit):
+        return True
+    return dimension(unit) == dimension(named) is not None and isclose(about.scale, factor(unit, named), rel_tol=1e-6)
+
+
 def quantity(
     column: Column, about: ColumnMap, name: str, resolution: float | None, target: str | None
 ) -> tuple[np.ndarray, str, list[Finding]]:
@@ -61,7 +71,7 @@ def quantity(
     unit = _unit(column, about.unit, name, about.place)
     of = check_unit(unit, DIMENSIONS[name], f"{name} ({column.name!r})")
     findings = []
-    if about.unit is not None and column.unit is not None and plain(about.unit) != plain(column.unit):
+    if about.unit is not None and column.unit is not None and not _is_same(column.unit, about):
         what = (
             f"the file says that {column.name!r} is in {column.unit}, the map says {about.unit}: the map was followed"
         )

@@ -84,3 +84,13 @@ def are_numbers(cells: Sequence[str]) -> bool:
 def is_comment(line: str) -> bool:
     """Whether a line is a remark, and not a row."""
     return line.lstrip().startswith(COMMENTS)
+
+
+def decoded(data: bytes) -> str:
+    """The text, of whichever coding: UTF-8 or 16 by its mark, else Windows' code page 1252 where it is no UTF-8."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")

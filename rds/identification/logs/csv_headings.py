@@ -1,10 +1,10 @@
 """Names and units of the columns of a text table, as recorders and drives head them.
 
-Beside `name [unit]` these are: `name/unit`, `name in unit`, `name, unit` and `name {unit}`; the head of LabVIEW's .lvm
-files, whose units stand in a row of their own; and tables in which each channel has a column of times before it, headed
-by rows of label and value in turn (`Name;ActPos;Name;SetPos`, `Unit;mm;Unit;mm`), as TwinCAT's scope exports them, or
-NI's SignalExpress (`Channel name,"Force"`, `Interval,0.0005`). TwinCAT's scope also gives channels one column of times
-together (`Name;ActPos;SetPos;Name;CmdVolt`). Mitsubishi's drives head their times by the unit: `ms`.
+Beside `name [unit]` these are: `name/unit`, `name in unit`, `name, unit` and `name {unit}`; and tables in which each
+channel has a column of times before it, headed by rows of label and value in turn (`Name;ActPos;Name;SetPos`,
+`Unit;mm;Unit;mm`), as TwinCAT's scope exports them, or NI's SignalExpress (`Channel name,"Force"`, `Interval,0.0005`).
+TwinCAT's scope also gives channels one column of times together (`Name;ActPos;SetPos;Name;CmdVolt`), all of them where
+they have one rate (`Name;ActPos;CmdVolt`). Mitsubishi's drives head their times by the unit: `ms`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from rds.identification.logs.units import dimension
 from rds.results.units import split_heading
 
 Split = Callable[[str], list[str]]
+_FIRST_INDEX = re.compile(r"\S\s+[\[(]1[\])]\s*$")
+_OTHER_INDEX = re.compile(r"\S\s+[\[(](?!1[\])])\d+[\])]\s*$")
 _BRACES = re.compile(r"(?P<name>.*?)\s*\{(?P<unit>[^{}]*)\}\s*")
 # what stands in brackets behind a name as a unit does, and says which of two signals of one name it is
 _NO_UNITS = (
@@ -24,9 +26,9 @@ _NO_UNITS = (
     *("measured", "actual", "act", "feedback", "ist"),
 )
 _BETWEEN = re.compile(r"\s*[/,]\s*|\s+[iI][nN]\s+")  # a name and its unit
-_LABVIEW, _LABVIEW_UNITS, _LABVIEW_TIME = "LabVIEW Measurement", "Y_Unit_Label", "X_Dimension"
 _SCALES = (("scalefactor", "1"), ("offset", "0"), ("unit scalefactor", "1"), ("unit offset", "0"))
-_LEAST_TIMES = 2  # columns of times
+_LEAST_TIMES = 2  # columns of times, but in an export of TwinCAT's scope
+_SCOPE = re.compile(r"start ?time of (export|record)", re.IGNORECASE)  # TwinCAT's, whose times are in ms
 _PAIR_NAMES, _PAIR_UNIT = ("name", "channel name"), "unit"
 _PAIR_TIMES = {"sampletime[ms]": "ms", "interval": "s"}  # which label says in which unit the times are
 # an oscilloscope's first line: `X,CH1,CH2,Start,Increment`, with units, start and step in the second one; of newer ones
@@ -74,18 +76,10 @@ def name_and_unit(cell: str) -> tuple[str, str | None]:
     return name, None
 
 
-def labview_units(above: Sequence[str], split: Split, names: Sequence[str]) -> tuple[str | None, ...] | None:
-    """The units of the columns `names` in a LabVIEW measurement file, by the lines above the data; None in another."""
-    if not any(line.startswith(_LABVIEW) for line in above):
-        return None
-    units: list[str | None] = [None] * len(names)
-    for line in above:
-        label, *cells = split(line) or [""]
-        if label == _LABVIEW_UNITS:
-            units[1 : len(cells) + 1] = [cell or None for cell in cells[: len(names) - 1]]
-        elif label == _LABVIEW_TIME and "Time" in cells:
-            units[0] = "s"
-    return tuple(units)
+def indexed(cells: Sequence[str]) -> set[str]:
+    """The headings in which `(1)` is the number of a signal, as in `pos (1)` beside `pos (2)`, and no unit."""
+    others = any(_OTHER_INDEX.search(cell) for cell in cells)
+    return {cell for cell in cells if others and _FIRST_INDEX.search(cell)}
 
 
 def labelled_headings(lines: Sequence[str], split: Split) -> Headings | None:
@@ -95,14 +89,16 @@ def labelled_headings(lines: Sequence[str], split: Split) -> Headings | None:
     """
     rows: dict[str, list[str]] = {}
     times: tuple[int, ...] = ()
+    scope = False
     for line in lines:
         cells = split(line)
         label = cells[0].casefold() if cells else ""
+        scope |= _SCOPE.fullmatch(label) is not None
         if label in _PAIR_NAMES and not times:
             while len(cells) > 1 and not cells[-1]:  # a delimiter at the end
                 cells.pop()
             found = tuple(i for i, cell in enumerate(cells) if cell.casefold() == label)
-            if len(found) < _LEAST_TIMES or len(cells) - 1 in found:
+            if len(found) < (1 if scope else _LEAST_TIMES) or len(cells) - 1 in found:
                 continue  # `Name;Project`, above the table
             times, rows[label] = found, cells
     if not times:
@@ -119,7 +115,7 @@ def labelled_headings(lines: Sequence[str], split: Split) -> Headings | None:
     if len(set(channels)) < len(channels):
         return None
     units = [_labelled_unit(cell) for cell in rows.get(_PAIR_UNIT, [""] * width)]
-    time = next((unit for label, unit in _PAIR_TIMES.items() if label in labels), None)
+    time = next((unit for label, unit in _PAIR_TIMES.items() if label in labels), "ms" if scope else None)
     return Headings(
         names=tuple(f"time of {names[i + 1]}" if i in times else names[i] for i in range(width)),
         units=tuple(time if i in times else units[i] for i in range(width)),

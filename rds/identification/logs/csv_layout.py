@@ -10,6 +10,7 @@ import codecs
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import isfinite
 from pathlib import Path
 
@@ -30,8 +31,8 @@ from rds.identification.logs.csv_cells import (
 from rds.identification.logs.csv_headings import (
     Headings,
     alternates,
+    indexed,
     labelled_headings,
-    labview_units,
     name_and_unit,
     of_rigol,
 )
@@ -43,6 +44,13 @@ HEAD = 1 << 16  # bytes looked at
 _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
 _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
 _TREND = re.compile(r"\d\d:\d\d:\d\d;\d{1,6},")  # a time in a trend of Rockwell's Studio 5000
+_SCOPE_ROWS = ("SymbolComment ", "Data-Type ", "SampleTime[ms] ")  # of TwinCAT's scope, with blanks between the cells
+_FEW_NULLS = 0.2  # share of a text's bytes
+# what stands in a row of units beside those of `units.py`
+_OTHER_UNITS = re.compile(
+    r"k?W|[°]?C|Deg C|degC|k?Hz|k?g|kgf|J|[AW]h|M?Pa|bar|N[.*]mm|(m|rad|deg)/s(\^2|²|2)|#|[kM]?Ohm|Ω"
+)
+_TIME_NAMES = ("time", "zeit", "date")
 _UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
 
 
@@ -86,6 +94,10 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
                 best = (score, width, mark, point, first)
     if (beside := _of_tektronix(lines, encoding)) is not None:
         return beside
+    if best is not None and quoted and (broken := _broken(lines[best[4] :])):
+        what = f"a cell in quotation marks goes on in the next line ({broken[:40]!r})"
+        cure = 'pandas.read_csv(FILE).replace(r"\\s*\\n\\s*", "", regex=True).to_csv("log.csv", index=False)'
+        raise InputError(f"{what}; take the line breaks out, in Python by `{cure}`", str(path))
     if any(line.startswith("Header:") for line in lines) and any(_TREND.search(line) for line in lines):
         what = "it is a trend of Studio 5000, whose times have a semicolon before the fraction"
         cure = "sed -E 's/(:[0-9]{2});([0-9]+),/\\1.\\2,/' FILE > log.csv"
@@ -104,7 +116,9 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
             remedy += "; its cells seem to stand between colons: export it with semicolons between them"
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
     _, width, mark, point, first = best
-    if mark == " " and labelled_headings(lines[:first], str.split) is not None:
+    if mark == " " and (
+        labelled_headings(lines[:first], str.split) is not None or any(line.startswith(_SCOPE_ROWS) for line in lines)
+    ):
         what = "its channels are headed by labels, and blanks stand between its cells, so that an empty one is lost"
         raise InputError(f"{what}; export it with semicolons between them (TwinCAT's scope asks for that)", str(path))
     whole = lines
@@ -137,11 +151,13 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         and not any(is_number(row[i], point) for row in body)
         and any(row[i].lower() not in BLANKS for row in body)
     )
-    if mark == " " and width - 1 in words and all(is_number(row[-1].rstrip("];"), point) for row in body[:_FEW]):
+    ends = [row[-1] for row in body[:_FEW] if row[-1].rstrip("];").lower() not in BLANKS]
+    if mark != ";" and width - 1 in words and ends and all(is_number(cell.rstrip("];"), point) for cell in ends):
         what = (
             "its rows end in ';', as a matrix is typed in MATLAB, so that its first row and last column cannot be read"
         )
-        raise InputError(f"{what}; take the marks off: `tr -d '[];' < FILE > log.txt`", str(path))
+        marks = "[];" if any(line.lstrip().startswith("[") for line in lines[first - 1 :]) else ";"
+        raise InputError(f"{what}; take the marks off: `tr -d '{marks}' < FILE > log.txt`", str(path))
     times = times or (tuple(range(0, width, 2)) if alternates(units) else ())
     announced = _announced(lines[:first])
     numbers = [i for i in range(width) if any(is_number(row[i], point) for row in body[:_FEW])]
@@ -169,6 +185,12 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         torn,
         surplus=surplus,
     )
+
+
+def _broken(lines: Sequence[str]) -> str:
+    """The first of two lines in turn that a cell in quotation marks stands across; "" where there is none."""
+    pairs = pairwise(lines)
+    return next((one for one, two in pairs if one.count('"') % 2 and two.startswith('"') and two.count('"') % 2), "")
 
 
 def _refuse_decimal_commas(heading: Sequence[str], width: int, path: Path) -> None:
@@ -207,7 +229,10 @@ def _head(path: Path) -> tuple[list[str], str]:
             raise InputError(
                 f"it is text in {name}; save it as CSV (UTF-8)", str(path)
             )  # read_csv turned it into UTF-8
-    if b"\0" in data:
+    if nulls := data.count(b"\0"):
+        if nulls < _FEW_NULLS * len(data) and b"\n" in data:
+            what = f"it has {nulls} null bytes between its text, as programs in C write the end of each"
+            raise InputError(f"{what}; take them off: `tr -d '\\000' < FILE > log.csv`", str(path))
         raise InputError("it is not text (it has null bytes); is its ending right?", str(path))
     encoding = "utf-8"
     try:
@@ -253,7 +278,15 @@ def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int,
     found = rows[width]
     usual = [sum(fits[i] for _, fits in found) > 0.9 * len(found) - 1 for i in range(width)]
     first = next((n for n, fits in found if all(f or not u for f, u in zip(fits, usual, strict=True))), found[0][0])
+    while first and _is_blank(split(lines[first - 1], delimiter), width):
+        first -= 1  # the first sample is a row of NaN
     return first, width, float(numbers[width])
+
+
+def _is_blank(cells: Sequence[str], width: int) -> bool:
+    """Whether a row has nothing but NaN."""
+    said = [cell.rstrip(";").lower() for cell in cells]
+    return len(cells) == width and all(cell.lstrip("+-") == "nan" for cell in said)
 
 
 def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> int:
@@ -361,7 +394,7 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
     heads = rows[-1] if rows else None
     if heads is not None and heads[0].strip("[]():").casefold() in _UNIT_LABELS and _are_units(heads[1:]):
         heads = ["", *heads[1:]]  # a label, and no unit
-    above_units = heads is not None and _are_units(heads) and len(rows) > 1 and rows[-2] is not None
+    above_units = heads is not None and len(rows) > 1 and rows[-2] is not None and _seem_units(heads, rows[-2], decimal)
     if heads is not None and above_units:
         units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
         heads = rows[-2]
@@ -372,8 +405,9 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
         return Headings(tuple(f"column {i + 1}" for i in range(width)), tuple(units))
     names: list[str] = []
     torn: list[str] = []
+    numbered = indexed(heads)
     for i, cell in enumerate(heads):
-        name, unit = name_and_unit(cell.strip('"'))
+        name, unit = (cell, None) if cell in numbered else name_and_unit(cell.strip('"'))
         if units[i] is not None and unit is not None and dimension(unit) is None:
             name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
         names.append(f"column {i + 1}" if i in numbers - filled or not name else name)
@@ -383,8 +417,7 @@ def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, wi
     for note in noted:
         if note is not None and note[0] in _UNIT_LABELS:
             units = [unit or own or None for unit, own in zip(units, ["", *note[1]], strict=True)]
-    of_labview = labview_units(lines[:first], lambda line: split(line, delimiter), names)
-    return Headings(tuple(names), of_labview or tuple(units), torn=tuple(torn))
+    return Headings(tuple(names), tuple(units), torn=tuple(torn))
 
 
 def _note(line: str, delimiter: str, width: int) -> tuple[str, list[str]] | None:
@@ -403,12 +436,26 @@ def _heading_cells(line: str, delimiter: str, width: int) -> list[str] | None:
     cells = split(text, delimiter)
     if delimiter == " " and len(cells) != width:  # `time [s]  position [mm]`
         cells = [cell.strip() for cell in re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", text)]
+    if delimiter == " " and len(cells) != width:  # `Time   Encoder 1 Pos   Control Effort`
+        cells = re.split(r"\s{2,}|\t", text.strip())
     return cells if len(cells) == width else None
 
 
 def _are_units(cells: Sequence[str]) -> bool:
     given = [cell.strip("[]() ") for cell in cells if cell.strip("[]()- ")]
     return bool(given) and all(dimension(cell) is not None for cell in given)
+
+
+def _seem_units(cells: Sequence[str], names: Sequence[str], decimal: str) -> bool:
+    """Whether a row below the row `names` is one of units, of which some may be unknown: half of them are none."""
+    if _are_units(cells):
+        return True
+    given = [cell for cell in cells if cell.strip("[]()- ")]
+    known = sum(dimension(cell.strip("[]() ")) is not None for cell in given)
+    other = sum(_OTHER_UNITS.fullmatch(cell.strip("[]() ")) is not None for cell in given)
+    words = all(not is_number(cell, decimal) for cell in (*cells, *names)) and all(names)
+    words &= not any(cell.casefold().startswith(_TIME_NAMES) for cell in given)  # a row of names below a title
+    return words and known > 0 and 2 * (known + other) >= len(given)
 
 
 def _announced(lines: Sequence[str]) -> int | None:

@@ -34,6 +34,7 @@ _COMMA_TIME = re.compile(rb"(?<!\d)(\d\d:\d\d:\d\d),(\d)")
 _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 _DAY = 86400.0  # s
 _WIDE, _TIMES_WIDER = 100, 10  # columns from which, and rows of which, a table lies on its side
+_FILETIME = 1e16  # in steps of 100 ns since 1601: times in ms are below
 _END = b"EOF"  # the last line of an export of TwinCAT's scope
 _SPELLED = (str.lower, str.upper, str.capitalize)
 _NULLS = [" ", "NaN", "+Inf", "-Inf", *(spelled(word) for word in BLANKS for spelled in _SPELLED)]
@@ -94,7 +95,7 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
     end, cut = _end(path, layout)
     if cut is not None:
         findings.append(cut)
-    names = _unique(layout.names, findings)
+    names = unique(layout.names, findings)
     words = set(layout.words)
     while True:  # a column that turns out to hold words is read again as such, once
         try:
@@ -145,8 +146,19 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
             name: column for name, column in columns.items() if name != "time"
         }
     if layout.times:
-        columns = _with_own_times(columns, layout.times)
+        columns = _with_own_times(_from_filetime(columns, layout.times), layout.times)
     return Table(path, "csv", columns, findings=tuple(findings))
+
+
+def _from_filetime(columns: Mapping[str, Column], at: Sequence[int]) -> dict[str, Column]:
+    """The columns with times in ms, where TwinCAT's scope wrote full stamps: Windows' FILETIME, in steps of 100 ns."""
+    listed = [*columns.values()]
+    stamps = [listed[i] for i in at if listed[i].unit == "ms"]
+    begins = [column.values[0] for column in stamps if len(column.values)]
+    if len(stamps) < len(at) or not begins or not min(begins) > _FILETIME:
+        return dict(columns)
+    since = {id(column): replace(column, values=(column.values - min(begins)) * 1e-4) for column in stamps}
+    return {name: since.get(id(column), column) for name, column in columns.items()}
 
 
 def _with_own_times(columns: Mapping[str, Column], at: Sequence[int]) -> dict[str, Column]:
@@ -403,7 +415,7 @@ def _end(path: Path, layout: Layout) -> tuple[int, Finding | None]:
     return size, Finding("cut", "its last line has no end: if the file was cut there, its last number may be wrong")
 
 
-def _unique(names: Sequence[str], findings: list[Finding]) -> list[str]:
+def unique(names: Sequence[str], findings: list[Finding]) -> list[str]:
     """The headings; from its second time on, one that repeats has a number: `position`, `position (2)`."""
     found: list[str] = []
     for at, name in enumerate(names):

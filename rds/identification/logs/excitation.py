@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import ceil
+
 import numpy as np
 
-from rds.identification.logs.log import Finding, Gravity, Log
+from rds.identification.logs.log import Finding, Gravity, Log, excited_part
 from rds.identification.logs.motion import motion, noise, travel
 from rds.machines.machine import Axis
 
@@ -16,6 +19,8 @@ _SHORT = 100  # samples
 _ANY_STEPS = 3  # of a speed, below which it is constant
 _WINDOWS = 8  # of a motion that starts
 _AT_REST, _STEADY = 0.5, 0.3  # of the steady speed: the first one, and how far the later ones are apart
+_BEGIN = 0.25  # of the steady speed: what an encoder's step may make of the first one
+_PARTS = 4  # of the second half
 _MOVED = 5.0  # encoder steps
 _BEYOND_NOISE = 12.0  # standard deviations: noise alone spans 10.4 in 10^7 samples
 
@@ -79,19 +84,42 @@ def has_one_level(log: Log) -> bool:
     return bool(np.ptp(command) > 0.0) and _levels(command, 1.0) <= 1 and _levels(command, -1.0) <= 1
 
 
+def steps_to_one_level(logs: Sequence[Log]) -> bool:
+    """Whether each log goes from rest to one level of command and stays there, and all go to the same: one speed."""
+    after = [excited_part(log, len(log)).command[1:] for log in logs]
+    largest = max(float(np.abs(command).max(initial=0.0)) for command in after)
+    before = [log.command[0] if np.ptp(log.command) else 0.0 for log in logs]
+    return not any(before) and float(np.ptp(np.concatenate(after))) <= _LEVEL * largest
+
+
 def is_steady(log: Log) -> bool:
     """Whether an axis only goes on under a constant command: by itself it tells nothing, beside other logs a speed."""
     moves = bool(log.position.any()) if log.is_rate else bool(np.ptp(log.position) > 0.0)
     return moves and bool(np.ptp(log.command) == 0.0) and bool(log.command[0] != 0.0) and not _starts(log)
 
 
+def is_at_rest(log: Log) -> bool:
+    """Whether an axis stands still under a constant command: by itself it tells nothing, beside other logs friction."""
+    return bool(np.ptp(log.command) == 0.0 and log.command[0] != 0.0 and np.ptp(log.position) == 0.0) and not (
+        log.is_rate and log.position.any()
+    )
+
+
 def _starts(log: Log) -> bool:
-    """Whether the axis goes from rest to a steady speed under a constant command: a step response without its begin."""
-    speed = motion(log).speed
+    """Whether the axis goes from rest to a steady speed under a constant command: a step response without its begin.
+
+    Speeds are means over so many windows that an encoder's steps do not matter.
+    """
+    seen = motion(log)
+    speed = seen.speed
     if log.command[0] == 0.0 or len(speed) < _WINDOWS:
         return False
-    first, last = (log.position[0] if log.is_rate else speed[0]), float(np.median(speed[len(speed) // 2 :]))
-    return abs(first) < _AT_REST * abs(last) and float(np.ptp(speed[len(speed) // 2 :])) < _STEADY * abs(last)
+    late = speed[len(speed) // 2 :]
+    last = abs(float(np.mean(late)))
+    begin = min(max(ceil(seen.noise / (_BEGIN * last)), 1), len(speed) // _WINDOWS) if last > 0.0 else 1
+    first = float(log.position[0] if log.is_rate else np.mean(speed[:begin]))
+    parts = [float(np.mean(part)) for part in np.array_split(late, _PARTS)]
+    return abs(first) < _AT_REST * last and float(np.ptp(parts)) < _STEADY * last
 
 
 def _goes(log: Log, way: float, reach: float) -> bool:

@@ -99,7 +99,7 @@ MAP = Table(
         "second": _SECOND,
         "samples": Quantity("how many there should be", "", 2, 10**9, whole=True),
         "jitter_limit": Quantity(
-            "how far a step of the time may be off", "parts of the sample period", 0.0, 0.5, default=JITTER_LIMIT
+            "how far a step of the time may be off", "parts of the sample period", 0.0, 1.0, default=JITTER_LIMIT
         ),
         "duplicates": Choice("what is done with repeated times", ("refuse", "drop"), "refuse"),
         "gaps": Choice("what is done with gaps", ("refuse", "split", "keep"), "refuse"),

@@ -42,7 +42,7 @@ class Table:
     """What a file holds. `constants` are single numbers beside the columns, as MAT files have them."""
 
     path: Path
-    format: str  # csv, codesys, halscope, labelled, mat, parquet, can, mdf
+    format: str  # csv, codesys, halscope, labelled, labview, mat, parquet, can, mdf
     columns: Mapping[str, Column]
     constants: Mapping[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  # about the file itself: cut, comments inside, encoding

@@ -61,7 +61,8 @@ _EXPORTS = {
     ".fig": "a figure of MATLAB: save the vectors that it shows as a MAT file",
 }
 _OF_BUS = re.compile(
-    rb"timestamp,arbitration_id,|time ?stamp,\s*id,\s*extended,|\s*\([\d. :-]{3,30}\)\s+\S+\s+[\dA-F]+(?:#|\s+\[)",
+    rb"timestamp,arbitration_id,|time ?stamp,\s*id,\s*extended,|\s*\([\d. :-]{3,30}\)\s+\S+\s+[\dA-F]+(?:#|\s+\[)|"
+    rb"\s+\S+\s+[\dA-F]{3,8}\s+\[\d+\]",  # candump without times, which its reader refuses
     re.IGNORECASE,
 )
 
@@ -154,6 +155,12 @@ FORMATS: tuple[DataFormat, ...] = (  # the first that a file is of reads it
     DataFormat("a bus log", (*_OF_FRAMES, ".gz"), _read_can),
     DataFormat("a bus log", TEXTS, _read_can, _is_of_bus),
     DataFormat("a trace of CODESYS", TEXTS, _late("codesys_table", "read_trace"), _late("codesys_table", "is_trace")),
+    DataFormat(
+        "a measurement of LabVIEW",
+        TEXTS,
+        _late("labview_table", "read_labview"),
+        _late("labview_table", "is_labview"),
+    ),
     DataFormat("columns of text", TEXTS, _read_csv),
     DataFormat("vectors of MATLAB", (".mat",), _late("other_tables", "read_mat")),
     DataFormat("numeric columns", (".parquet",), _late("other_tables", "read_parquet")),
@@ -184,6 +191,7 @@ def read_table(
         found = next(fitting, None)
         if found is None:
             told = f"it is {_EXPORTS[ending]}. Read" if ending in _EXPORTS else "known"
+            told = told if ending else f"let the name of a table of text end in .csv; {told}"
             raise InputError(f"there is no log of the ending {ending!r}; {told}: {', '.join(endings())}")
         table = found.read(path, asked)
         unprintable = next((name for name in table.columns if not name.isprintable()), None)

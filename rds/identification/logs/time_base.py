@@ -12,6 +12,9 @@ from rds.identification.logs.log import Finding, Gravity
 
 _GAP = 1.5  # sample periods: a longer step has samples missing in it
 _HOUR = 3600.0  # s
+_LEFT_OVER = 0.05  # of the samples: so many before the time goes back, once, may be left from before the recording
+_ROUGH = 0.5  # periods: beyond it a step is hardly one of a regular recording
+MOST_JITTER = 1.0  # periods
 _ROUNDING = 1e-3  # of the period: less is rounding, and no jitter
 
 
@@ -37,13 +40,16 @@ def time_base(time: np.ndarray, jitter_limit: float, duplicates: str, gaps: str,
     back = np.flatnonzero(steps < 0.0)
     if len(back):
         k = int(back[0]) + 1
-        remedy = (
-            "a clock that is set back by an hour does so, as where summer time ends: log UTC, or give the later rows "
-            "their hour"
-            if len(back) == 1 and _HOUR - 60.0 < -steps[k - 1] < _HOUR
-            else "is the column the time, and is it one recording? Of a counter that begins again, say in the map at "
-            "which number, as in wrap = 65536 under [time]"
-        )
+        remedy = "is the column the time, and is it one recording? Of a counter that begins again, say in the map at "
+        remedy += "which number, as in wrap = 65536 under [time]"
+        if len(back) == 1 and _HOUR - 60.0 < -steps[k - 1] < _HOUR:
+            remedy = (
+                "a clock that is set back by an hour does so, as where summer time ends: log UTC, or give the later "
+            )
+            remedy += "rows their hour"
+        elif len(back) == 1 and k <= _LEFT_OVER * len(time):
+            rows = f"the first {k} rows of data are" if k > 1 else "the first row of data is"
+            remedy = f"{rows} left from before the recording, as it seems: remove {'them' if k > 1 else 'it'}"
         raise InputError(
             f"time goes back at sample {k}, from {time[k - 1]:.9g} to {time[k]:.9g} s ({len(back)} such steps); "
             + remedy,
@@ -70,6 +76,8 @@ def time_base(time: np.ndarray, jitter_limit: float, duplicates: str, gaps: str,
     if len(wide) and gaps == "split":
         ends = [0, *(wide + 1).tolist(), len(keep)]
         stretches = [(a, b) for a, b in pairwise(ends) if b - a >= 2]
+    if gaps == "keep":
+        wide = np.flatnonzero(steps > _GAP * period)  # samples that only came late, too
     steps = np.delete(steps, wide)
     findings += _jitter(time[keep], steps, wide, period, jitter_limit, where)
     return TimeBase(keep, tuple(stretches), period, tuple(findings))
@@ -119,15 +127,16 @@ def _jitter(
     if worst > limit * period * (1.0 + 1e-9):
         first = int(np.flatnonzero(off > limit * period * (1.0 + 1e-9))[0])
         k = first + int(np.searchsorted(wide - np.arange(len(wide)), first, side="right")) + 1
-        remedy = (
-            "a larger jitter_limit in the map (at most 0.5) takes the times as they are"
-            if worst <= 0.5 * period
-            else "no jitter_limit (at most 0.5) allows that: record at equal steps, "
-            "with times of what measured, or resample the file"
-        )
+        remedy = f"a larger jitter_limit in the map (at most {MOST_JITTER:g}) takes the times as they are"
+        if worst > MOST_JITTER * period:
+            remedy = (
+                f'no jitter_limit (at most {MOST_JITTER:g}) allows that: gaps = "keep" in the map says that samples '
+            )
+            remedy += "came late, and the command was held; else record at equal steps"
         raise InputError(
             f"{what}; beyond the limit of {100.0 * limit:g} % first at sample {k} ({time[k - 1]:.9g} s, then "
             f"{time[k]:.9g} s); {remedy}",
             where,
         )
-    return [Finding("jitter", f"{what}; used as they are")]
+    gravity = Gravity.NOTE if worst <= _ROUGH * period else Gravity.WARNING
+    return [Finding("jitter", f"{what}; used as they are", gravity)]

@@ -59,7 +59,9 @@ _SPELLINGS: Mapping[str, str] = MappingProxyType(
         **dict.fromkeys(("cts/s", "inc/s", "ticks/s", "pulses/s", "steps/s", "count/s", "counts/sec"), "counts/s"),
         **dict.fromkeys(("volt", "volts", "Volt", "Volts"), "V"),
         **dict.fromkeys(("ampere", "amperes", "amp", "amps", "Ampere", "Amp", "Amps"), "A"),
+        **dict.fromkeys(("newton", "newtons", "Newton", "Newtons"), "N"),
         **dict.fromkeys(("N.m", "N*m", "N·m"), "Nm"),
+        **dict.fromkeys(("Nmm", "N.mm", "N*mm", "N·mm"), "mNm"),
         **dict.fromkeys(("percent", "pct"), "%"),
         **dict.fromkeys(("‰", "per mille", "0.1%", "0,1%"), "permille"),
     }

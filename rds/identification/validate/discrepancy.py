@@ -47,6 +47,7 @@ _PLAYS = (2.0, 6.0)  # times the residual: widths of a play that is tried
 _FAR_MORE = 0.5  # of the residual, at most, where play is what it lacks
 _CHANCE = 0.01
 _TOLD = 1.0  # %: standard error of a gain that the log tells
+_ANY = 20.0  # %: the same, of a gain of which it tells next to nothing
 _SAME = 0.1  # %: gains that differ by less are one
 _LINEAR = {"tau", "K", "friction_plus", "friction_minus"}
 
@@ -133,12 +134,15 @@ def as_axis(candidate: Candidate, log: Log, noise: float, frequency: float = 0.0
             error = max(error, 100.0 * error_of(lambda p: log_of(1.0 + of(p) / 100.0), point, covariance))
         return Off(value, error, _UNITS[measure])
 
+    gain, delay = _gain_of(told("static"), replace(told("gain"), at=f)), told("delay")
+    if not gain.error < _ANY:  # where any gain would do, any delay would, even one at the edge of the search
+        delay = replace(delay, error=float("inf"))
     return Discrepancy(
         frequency=f,
-        gain=_gain_of(told("static"), replace(told("gain"), at=f)),
+        gain=gain,
         phase=told("phase"),
         lag=told("lag"),
-        delay=told("delay"),
+        delay=delay,
         friction=max((told(name) for name in ("forward", "backward")), key=clear),
         rmse=own.rms(left.squares),
         reached=problem.rms(best.squares),
