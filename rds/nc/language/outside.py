@@ -74,9 +74,7 @@ _HEIDENHAIN = (
     "this is Heidenhain's conversational language, which is not read here; have the part's program written for"
     " LinuxCNC: L X+10 R0 F200 is G1 X10 F200 here"
 )
-_KLIPPER = (
-    "this is a command of Klipper, which runs 3-D printers; let a CAM program write the part for a mill"
-)
+_KLIPPER = "this is a command of Klipper, which runs 3-D printers; let a CAM program write the part for a mill"
 _NO_LABEL = (
     "the O word that this word of a branch, a loop or a subroutine belongs to is missing; write it before, as O1 ENDIF"
     " for O1 IF"

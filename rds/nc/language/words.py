@@ -130,11 +130,9 @@ def read_words(text: str, at: int, block: Block, parameters: Parameters) -> dict
             if letter == "g" and reader.peek() == "r":
                 raise Fault(GR_IS_OFF, at=start)
             if _NO_VALUE.match(text, reader.at):
-                raise Fault(
-                    f"{letter.upper()} has no number; write one, as {letter.upper()}2, a parameter #... or an expression"
-                    " [...]",
-                    at=start,
-                )
+                word = letter.upper()
+                said = f"{word} has no number; write one, as {word}2, a parameter #... or an expression [...]"
+                raise Fault(said, at=start)
             value = reader.value()
             try:
                 if letter == "g":
