@@ -38,7 +38,7 @@ FAULTS = [
     ("G0 X[2 +\nM2", 1, 9, "", "a number is missing"),
     ("#faces = 24\nM2", 1, 2, "F", "the name of a parameter stands in < >; write #<faces>"),
     ("G0 X#depth\nM2", 1, 6, "D", "write #<depth>"),
-    ("G41 D1.5\nM2", 1, 5, "D1.5", "the number of a tool, not 1.5; write G41.1 D1.5 for a diameter"),
+    ("G41 D1.5\nM2", 1, 5, "D1.5", "a whole number, not 1.5; write G41.1 D1.5 for a diameter"),
     ("$RST=gcode\nM2", 1, 1, "$", "settings and commands of a sender"),
     ("EXCLUDE_OBJECT_DEFINE NAME=cube\nM2", 1, 0, "", "a command of Klipper"),
     ("O5 IF [1]\nO5 ENDIF\nO5 IF [1]\nO5 ENDIF\nM2", 3, 1, "O5", "O5 belongs to IF in line 1 already"),

@@ -77,7 +77,8 @@ def _tool_of(d: float, code: int) -> int:
     try:
         return whole(d)
     except Fault:
-        said = f"D of G{code // 10} is the number of a tool, not {d:g}; write G{code // 10}.1 D{d:g} for a diameter"
+        word = f"G{code // 10}"
+        said = f"D of {word} is a tool's number, a whole number, not {d:g}; write {word}.1 D{d:g} for a diameter"
         raise Fault(said) from None
 
 

@@ -164,8 +164,8 @@ class Reader:
     def _function(self) -> float:
         match = FUNCTION.match(self.text, self.at)
         if match is None:
-            if self.text[self.at - 1 : self.at] == "#" and (name := _NAME.match(self.text, self.at)):
-                raise self.fault(f"the name of a parameter stands in < >; write #<{name[0]}>")
+            if self.text[self.at - 1 : self.at] == "#" and (bare := _NAME.match(self.text, self.at)):
+                raise self.fault(f"the name of a parameter stands in < >; write #<{bare[0]}>")
             raise self.fault(f"a value cannot begin with {self._character()}; functions are {_FUNCTIONS_TEXT}")
         at, name = self.at, match[0]
         self.at = match.end()
