@@ -8,11 +8,13 @@ from typing import Annotated
 import typer
 
 from rds.cli.common import Json, print_json, progress_bars, refusals, writes_files
+from rds.cli.nc_options import ProgramOptions
 
 
 @writes_files
 def methods(
     file: Annotated[Path, typer.Argument(help="A path file (.toml) or a part program.")],
+    reading: ProgramOptions,
     add: Annotated[
         list[Path] | None, typer.Option(help="Your .py file with interpolate(), beside the library's; can be repeated.")
     ] = None,
@@ -62,6 +64,7 @@ def methods(
                 acceleration=filter_,
                 sample_period=period,
                 as_built=plant == "machine",
+                setup=reading.setup(),
                 progress=bar("methods"),
             )
         law = controller or usual_controller(load_machine(machine))

@@ -130,6 +130,28 @@ def test_a_dxf_joins_lines_and_arcs_and_follows_bulges_and_blocks(folder: Path) 
         read_vector_drawing(str(folder / "part.dxf"))
 
 
+def test_a_plate_of_many_holes_has_its_area_without_going_through_it_for_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    """256 holes in a plate: a pair of areas goes on with the next pair, so that each corner counts eight times."""
+    from shapely import Polygon, get_num_coordinates
+    from shapely.geometry.base import BaseGeometry
+
+    met = 0
+
+    def counted(one: BaseGeometry, other: BaseGeometry) -> BaseGeometry:
+        nonlocal met
+        met += get_num_coordinates(one) + get_num_coordinates(other)
+        return difference(one, other)
+
+    difference = BaseGeometry.symmetric_difference
+    monkeypatch.setattr(BaseGeometry, "symmetric_difference", counted)
+    plate = polyline_curve([[-1.0, -1.0], [33.0, -1.0], [33.0, 33.0], [-1.0, 33.0]], True, "")
+    assert plate is not None
+    holes = [circle_curve(2.0 * (k % 16), 2.0 * (k // 16), 0.5, "") for k in range(255)]
+    area = area_of([plate, *holes], "test")
+    assert area.area == pytest.approx(34.0**2 - 255 * Polygon(holes[0].points).area)
+    assert met < 9 * get_num_coordinates(area)
+
+
 def test_a_rational_spline_is_a_circle(folder: Path) -> None:
     r = 0.5**0.5
     corners = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)]

@@ -66,6 +66,21 @@ def test_a_method_of_one_kind_is_refused_where_the_other_comes(tmp_path: Path) -
     assert "straight moves only" in refused["linear"] and "arcs only" in refused["circular"]
 
 
+def test_a_program_is_read_with_its_tools_and_options(tmp_path: Path) -> None:
+    program, table = tmp_path / "short.ngc", tmp_path / "tools.tbl"
+    program.write_text("G21 G90\nT1 M6\nF600\nG1 X0.1 Y0.1\n")
+    table.write_text("T1 P1 Z0 D3\n")
+    options = ["nc", "methods", str(program), "--json", "--period", "0.01", "--with", "open-end"]
+    told = json.loads(CliRunner().invoke(app, [*options, "--tools", str(table)]).stdout)
+    assert "linear" in str(told["tables"])
+    without = CliRunner().invoke(app, options)
+    assert without.exit_code == 2 and "the tool table has no tool 1" in without.output
+    path = tmp_path / "circle.toml"
+    path.write_text(CIRCLE)
+    with pytest.raises(InputError, match="are of part programs; leave them out"):
+        compare_methods(path, setup={"tools": table})
+
+
 def test_an_own_file_stands_beside_them_and_the_page_is_written(tmp_path: Path) -> None:
     (tmp_path / "line.toml").write_text('start = [0.0]\nfeed = 600\n[[segment]]\nkind = "line"\nend = [2.0]\n')
     (tmp_path / "halves.py").write_text(HALVES)

@@ -378,3 +378,17 @@ def test_a_path_at_the_end_of_the_travel_and_in_whole_blu_is_followed(here: Path
     line["interpolator"] = "reference-pulse"
     pulses = rds.Experiment(axis="X", controller="p", sample_period=0.0002, reference=line).run()
     assert pulses["X_reference"][-1] == 1.0
+
+
+def test_a_part_program_is_read_with_the_setup_of_its_reference(here: Path) -> None:
+    """Its tool table stands beside the experiment; of a path there is nothing to set up."""
+    (here / "short.ngc").write_text("G21 G90\nT1 M6\nG43\nF600\nG1 X1 Z1\n")
+    (here / "tools.tbl").write_text("T1 P1 Z2 D3\n")
+    setup = {"tools": "tools.tbl", "open_end": True}
+    words = {"kind": "path", "file": "short.ngc", "setup": setup}
+    run = rds.Experiment(axis=["X", "Y", "Z"], controller="tracking", reference=words).run()
+    assert (run["X_reference"][-1], run["Z_reference"][-1]) == (1.0, 3.0)  # the tool is 2 mm long
+    with pytest.raises(InputError, match=r"there is no 'open-end'; .* did you mean 'open_end'"):
+        rds.Experiment(axis=["X", "Y", "Z"], reference=words | {"setup": {"open-end": True}}).run()
+    with pytest.raises(InputError, match="is of part programs, and this is a path"):
+        rds.Experiment(axis=["X", "Y"], reference={"kind": "path", "file": "circle.toml", "setup": setup}).run()

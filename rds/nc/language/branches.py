@@ -88,7 +88,8 @@ class Branches:
             self._define(word)
         elif label.kind not in others and (label.place != self.source.place or label.source is not self.source):
             raise Fault(
-                f"{word.spelled} is already a {label.kind.upper()} in line {label.place.line}; take another number",
+                f"{word.spelled} belongs to {label.kind.upper()} in line {label.place.line} already;"
+                " take another number",
                 at=word.at,
             )
 

@@ -59,7 +59,7 @@ def _cutter(m: Context, code: int, words: dict[str, float]) -> tuple[float, int]
     slot = 0
     if "d" in words:
         try:
-            number = whole(words["d"])
+            number = _tool_of(words["d"], code)
             if number < 0:
                 raise Fault(f"D{number} is negative; write the number of a tool")
             slot = m.tools.find(number)
@@ -70,6 +70,16 @@ def _cutter(m: Context, code: int, words: dict[str, float]) -> tuple[float, int]
     if m.state.plane == XY and tool.orientation not in (0, 9):
         raise Fault(f"tool {tool.number} is a lathe tool, which is compensated in the plane of G18 only", f"g{code}")
     return m.from_machine(tool.diameter) / 2.0, tool.orientation
+
+
+def _tool_of(d: float, code: int) -> int:
+    """The number of the tool that D of G41 or G42 names, which some take for the cutter's diameter."""
+    try:
+        return whole(d)
+    except Fault:
+        word = f"G{code // 10}"
+        said = f"D of {word} is a tool's number, a whole number, not {d:g}; write {word}.1 D{d:g} for a diameter"
+        raise Fault(said) from None
 
 
 def hold_beside_contour(m: Context, compensation: Compensation) -> None:

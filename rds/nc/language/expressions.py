@@ -24,6 +24,7 @@ SPELLED = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 _OUTSIDE_ASCII = re.compile(r"[\x80-\xff]+")
 _MINUS = "\N{MINUS SIGN}".encode().decode("latin-1")  # a program's text is read byte by byte
 FUNCTION = re.compile(r"abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan")
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
 OPERATION = re.compile(r"\*\*|[-+*/\]]|and|mod|or|xor|eq|ne|ge|gt|le|lt")
 PRECEDENCE = {
     **dict.fromkeys(("and", "or", "xor"), 2),
@@ -163,6 +164,8 @@ class Reader:
     def _function(self) -> float:
         match = FUNCTION.match(self.text, self.at)
         if match is None:
+            if self.text[self.at - 1 : self.at] == "#" and (bare := _NAME.match(self.text, self.at)):
+                raise self.fault(f"the name of a parameter stands in < >; write #<{bare[0]}>")
             raise self.fault(f"a value cannot begin with {self._character()}; functions are {_FUNCTIONS_TEXT}")
         at, name = self.at, match[0]
         self.at = match.end()

@@ -74,6 +74,7 @@ _HEIDENHAIN = (
     "this is Heidenhain's conversational language, which is not read here; have the part's program written for"
     " LinuxCNC: L X+10 R0 F200 is G1 X10 F200 here"
 )
+_KLIPPER = "this is a command of Klipper, which runs 3-D printers; let a CAM program write the part for a mill"
 _NO_LABEL = (
     "the O word that this word of a branch, a loop or a subroutine belongs to is missing; write it before, as O1 ENDIF"
     " for O1 IF"
@@ -87,9 +88,10 @@ _LANGUAGES = tuple(
             r"[0-9]*(?:(?:begin|end)pgm|tool(?:call|def)|cycl(?:call|def)|call(?:lbl|pgm)|blkform|[lc]{1,2}[xyz][-+])",
             _HEIDENHAIN,
         ),
+        (r"(?:exclude_object|set_[a-z_]+|bed_mesh|print_start|start_print|timelapse)", _KLIPPER),
         (
             r"(?:n[0-9]+)?(?:a?(?:trans|rot|scale|mirror)(?:$|[;xyzr])|cycle[0-9]+\(|mcall|msg\(|r[0-9]+="
-            r"|def(?:real|int|bool|string)|goto[bfc]|(?:pocket|slot|holes)[0-9]\(|if[r$])|[^(;<#]*[a-z]{2}=",
+            r"|def(?:real|int|bool|string)|goto[bfc]|(?:pocket|slot|holes)[0-9]\(|if[r$])|[^(;<#$]*[a-z]{2}=",
             _SIEMENS,
         ),
         (r"(?:n[0-9]+)?(?:[bd]prnt\[|popen$|pclos$)", _PRINTED),

@@ -19,6 +19,7 @@ _WORD = re.compile(rf"([a-z@^])({_NUMBER})")
 _LINE_NUMBER = re.compile(r"/?(?:n([0-9]*)(\.?)([0-9]*))?")
 OTHERS = frozenset("abcdefhijklpqrstxyz@^")
 _DIGITS_MOST = 9
+_NO_VALUE = re.compile(r"$|[(;]|[a-z][-+.0-9\[#]")  # behind a letter: nothing, a comment, or the next word
 _ANYTHING = re.compile(
     rf"gr[0-9]*|(?:{FUNCTION.pattern})(?=\[)|[a-z@^]?{_NUMBER}|#(?:<[^>]*>|[0-9]+)|[\x80-\xff]+|.",
     re.DOTALL,
@@ -128,6 +129,10 @@ def read_words(text: str, at: int, block: Block, parameters: Parameters) -> dict
         elif letter in OTHERS or letter in "gm":
             if letter == "g" and reader.peek() == "r":
                 raise Fault(GR_IS_OFF, at=start)
+            if _NO_VALUE.match(text, reader.at):
+                word = letter.upper()
+                said = f"{word} has no number; write one, as {word}2, a parameter #... or an expression [...]"
+                raise Fault(said, at=start)
             value = reader.value()
             try:
                 if letter == "g":

@@ -23,7 +23,7 @@ def area_of(curves: Iterable[Curve], owner: str) -> Any:
     with needed_for("offsets of a drawing"):
         from shapely import Polygon
 
-    area: Any = Polygon()
+    areas: list[Any] = []
     for curve in curves:
         if curve.circle is not None and curve.circle[2] == 0.0:
             continue
@@ -33,7 +33,11 @@ def area_of(curves: Iterable[Curve], owner: str) -> Any:
                 f"{owner}: the curve that begins at X {x:.3f} Y {y:.3f} mm is open; close it, or engrave it"
             )
         polygon = Polygon(curve.points)
-        area = area.symmetric_difference(polygon if polygon.is_valid else polygon.buffer(0))
+        areas.append(polygon if polygon.is_valid else polygon.buffer(0))
+    while len(areas) > 1:  # in pairs: one after the other, each would go through all that came before it
+        last = areas[len(areas) // 2 * 2 :]
+        areas = [one.symmetric_difference(other) for one, other in zip(areas[::2], areas[1::2], strict=False)] + last
+    area = areas[0] if areas else Polygon()
     if area.is_empty:
         raise InputError(f"{owner}: there is no closed curve here; draw one, or take another layer")
     return area

@@ -23,8 +23,10 @@ from rds.modes import SIMULATION
 from rds.modes.experiment import Experiment
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import InterpolatedProgram
+from rds.nc.language.dialect import Dialect
 from rds.nc.run.path import SUFFIX
 from rds.nc.run.run import usual_controller
+from rds.nc.setup import Setup
 from rds.results import Result
 from rds.results.reports.content import Report, Table
 
@@ -72,12 +74,14 @@ def compare_methods(
     acceleration: Any = None,
     sample_period: float | None = None,
     as_built: bool = True,
+    setup: Setup | Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> list[Compared]:
     """Every method of the library, and the users' files `own`, along the path (or part program) in `file`, simulated.
 
     The axes are those behind the bus, with friction, play and the loop's sample of delay; without `as_built`, the
     machine's model that controllers are designed for. Without `controller`, they have the law of part programs.
+    `setup`: what a part program is read with.
     A method that refuses a segment of the path (`circular` a line) says so in `refused`. InputError for what is wrong
     with the path, the machine or the words; ContractError for an own interpolator that breaks its interface.
     """
@@ -86,6 +90,9 @@ def compare_methods(
         raise InputError("there is no such path or part program; check the name and the folder", str(file))
     axes = list("XYZ") if path.suffix != SUFFIX else list("XYZ")[: len(read_segments(path)[0].start)]
     names = [*LIBRARY.names(), *map(str, own)]
+    read_with = _words_of(Setup.of(setup))
+    if read_with and path.suffix == SUFFIX:
+        raise InputError("tools, parameters and options of the dialect are of part programs; leave them out", str(file))
     loaded = load_machine(machine)
     controller = usual_controller(loaded) if controller is None else controller
     of_axes = _as_built(loaded, axes, sample_period) if as_built else {}
@@ -93,7 +100,8 @@ def compare_methods(
     for number, name in enumerate(names):
         if progress is not None:
             progress(number, len(names))
-        words = {"kind": "path", "file": str(path.resolve()), "interpolator": name}
+        words: dict[str, Any] = {"kind": "path", "file": str(path.resolve()), "interpolator": name}
+        words |= {"setup": read_with} if read_with else {}
         table: dict[str, Any] = {"machine": machine, "axes": axes, "controller": controller} | of_axes
         table["reference"] = words | ({} if acceleration is None else {"acceleration": acceleration})
         if sample_period is not None:
@@ -112,6 +120,15 @@ def compare_methods(
     if progress is not None:
         progress(len(names), len(names))
     return found
+
+
+def _words_of(setup: Setup) -> dict[str, Any]:
+    """The setup as the table of an experiment, with what differs from its defaults."""
+    files = {"tools": setup.tools, "parameters": setup.parameters}
+    words: dict[str, Any] = {name: str(file.resolve()) for name, file in files.items() if file is not None}
+    words |= {"correct": True} if setup.correct else {}
+    usual = Dialect()._asdict()
+    return words | {name: value for name, value in setup.options._asdict().items() if value != usual[name]}
 
 
 def _as_built(machine: Machine, axes: Sequence[str], sample_period: float | None) -> dict[str, Any]:

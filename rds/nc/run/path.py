@@ -73,6 +73,10 @@ WORDS = Table(
                 ),
             ),
         ),
+        "setup": Table(
+            "what a part program is read with: tools, parameters, options of the dialect",
+            others=AnyValue("a file, or an option of the dialect"),
+        ),
         "profile": Choice("in place of an interpolator: how the motion is planned before the run", tuple(PROFILES)),
         "exact_stop": Flag("with acceleration: the axes come to rest at the end of each segment", False),
         "look_ahead": Quantity(
@@ -110,12 +114,16 @@ def program(
             words.place("file" if file is not None else None),
         )
     made: InterpolatedProgram | Program
-    if file is not None and not str(file).endswith(SUFFIX):
+    is_program = file is not None and not str(file).endswith(SUFFIX)
+    if "setup" in words and not is_program:
+        raise words.fault("setup", "is of part programs, and this is a path; leave it out")
+    if is_program:
+        setup = _setup(words, folder)
         words.done()
         if method is not None:
-            made = of_part_program(folder / file, machine, None, T, method)
+            made = of_part_program(folder / file, machine, setup, T, method)
         else:
-            made = _with_origin(prepare(folder / file, machine, None, T, None, profile, last), profile)
+            made = _with_origin(prepare(folder / file, machine, setup, T, None, profile, last), profile)
         if set(axes) - {made.spindle} != set(made.axes):
             raise InputError(
                 f"a part program moves {', '.join(made.axes)}, and the run has {', '.join(axes)}; "
@@ -188,6 +196,16 @@ def _noted(made: InterpolatedProgram | Program, note: str) -> InterpolatedProgra
     if isinstance(made, InterpolatedProgram):
         return replace(made, notes=(*made.notes, note))
     return replace(made, origin=replace(made.origin, notes=(*made.origin.notes, note)))
+
+
+def _setup(words: TomlTable, folder: Path) -> Setup | None:
+    """What the table `setup` says a part program is read with; its files stand beside the experiment."""
+    given = words.inner("setup")
+    if given is None:
+        return None
+    table = dict(given.table)
+    files = {name: folder / table[name] for name in ("tools", "parameters") if isinstance(table.get(name), str)}
+    return Setup.of(table | files)
 
 
 def of_part_program(

@@ -147,5 +147,7 @@ def checked(drawing: Drawing) -> Drawing:
     if count > MOST_POINTS:
         raise InputError(f"has {count} points; at most {MOST_POINTS} are taken: is its unit mm?", drawing.name)
     if not all(np.isfinite(curve.points).all() and (abs(curve.points) < 1e5).all() for curve in drawing.curves):
-        raise InputError("has points beyond 100 m; is its unit right?", drawing.name)
+        is_dxf = drawing.name.lower().endswith(".dxf")
+        remedy = "is its header's unit right? give another (unit: mm, cm, m or in)" if is_dxf else "is its size right?"
+        raise InputError(f"has points beyond 100 m; {remedy}", drawing.name)
     return drawing
