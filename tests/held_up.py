@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import os
 import re
-import socket
 import subprocess
 import threading
 from collections.abc import Generator
@@ -45,12 +44,13 @@ def waited() -> float | None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Count what is started, and let a worker's words go at once.
+    """Count what is started, and let workers ask less.
 
     Not by an audit hook, which Python calls for each import and open, too: 2 % of what the tests compute.
 
-    Before each test, a worker of pytest-xdist asks over TCP whether it has crashed there before, in two small words.
-    TCP keeps the second one back for 40 ms unless it is told not to: 150 s of this project's tests.
+    Before each test, a worker of pytest-xdist would ask whether it has crashed there before, byte by byte over TCP,
+    though this project's scheduler (conftest.py) never runs such a test again; after each, how many tests were run
+    again, which it asks once more where it counts.
     """
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(before=_count)
@@ -67,9 +67,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
     subprocess.Popen.__init__ = begun  # type: ignore[method-assign]
     threading.Thread.start = counted  # type: ignore[method-assign]
-    line = getattr(getattr(config, "failures_db", None), "sock", None)
-    if line is not None:
-        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    crashes = getattr(config, "failures_db", None)
+    if crashes is not None and hasattr(config, "workerinput"):
+        crashes.get_test_failures = lambda test: 0
+        crashes.set_test_reruns = lambda test, reruns: None
+        crashes.get_suite_reruns = lambda: 0
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
