@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from io import BytesIO
 from typing import Any
 
@@ -15,6 +16,7 @@ from made_results import make_result
 from matplotlib.image import imread
 from matplotlib.text import Text
 
+from rds.core import figure
 from rds.core.errors import InputError
 from rds.core.figure import CYCLE, Picture
 from rds.panels.texts import exchanger, languages, texts, translate_picture
@@ -60,14 +62,20 @@ def test_a_picture_is_labelled_and_not_cut_off(name: str, tmp_path: Any) -> None
 
 def test_a_picture_is_drawn_once_and_as_matplotlib_saves_it(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
     saved = BytesIO()
-    plots.response(result, "X").savefig(saved, format="png", metadata={"Software": None})
+    with monkeypatch.context() as patch:
+        patch.setattr(figure, "_ticks_kept", nullcontext)
+        plots.response(result, "X").savefig(saved, format="png", metadata={"Software": None})
     draw, calls = Axes.draw, []
+    place, placed = Axis._update_ticks, []  # type: ignore[attr-defined]
     monkeypatch.setattr(Axes, "draw", lambda self, renderer: calls.append(self) or draw(self, renderer))  # type: ignore[func-returns-value]
+    monkeypatch.setattr(Axis, "_update_ticks", lambda self: placed.append(self) or place(self))  # type: ignore[func-returns-value]
     picture = plots.response(result, "X")
     assert picture.png() == saved.getvalue()
     assert calls == picture.axes
+    assert len(placed) == 3 * 2 * len(calls), "the ticks of each axis for two rounds of the layout, and to draw"
 
 
 def labels(picture: Picture) -> str:
