@@ -99,23 +99,24 @@ def written(
 
 
 _OURS = ("make", "options")  # parameters of `written` that are no options of its commands
+_SHARED = {name: p for name, p in inspect.signature(written).parameters.items() if name not in _OURS}
+_SHARED_HINTS = get_type_hints(written, include_extras=True)
 
 
 def maker(make: Callable[..., Made]) -> Callable[..., None]:
     """A command of `make`'s own options and those of `written`."""
     own = inspect.signature(make).parameters
-    shared = {name: p for name, p in inspect.signature(written).parameters.items() if name not in _OURS}
-    hints = {name: _option(name, get_type_hints(make, include_extras=True)[name]) for name in own}
-    hints |= get_type_hints(written, include_extras=True)
+    declared_hints = get_type_hints(make, include_extras=True)
+    hints = {name: _option(name, declared_hints[name]) for name in own} | _SHARED_HINTS
 
-    options = {name.replace("_", "-") for name in (*own, *shared)}
+    options = {name.replace("_", "-") for name in (*own, *_SHARED)}
 
     @wraps(make)
     def command(**given: Any) -> None:
         mine = {name: given.pop(name) for name in own}
         written(**given, make=lambda: make(**mine), options=options)
 
-    parameters = [p.replace(kind=p.KEYWORD_ONLY, annotation=hints[p.name]) for p in (*own.values(), *shared.values())]
+    parameters = [p.replace(kind=p.KEYWORD_ONLY, annotation=hints[p.name]) for p in (*own.values(), *_SHARED.values())]
     take(command, parameters)
     return app.command()(writes_files(command))
 
