@@ -99,7 +99,8 @@ class _Run:
         if not found.faults:
             self._probe()
         best = [min(ns, memory.ns.get(k, ns)) for k, ns in enumerate(self.ns)]
-        first = min(self.ns[0], memory.first_ns or self.ns[0]) if self.ns else 0
+        own = self.ns[0] - (self.work.first_waited or 0) if self.ns else 0
+        first = min(own, memory.first_ns or own)
         self.timing = judge_time(found, "control()", best, first, self.work.close(), self.T)
 
     def _drive(self) -> None:

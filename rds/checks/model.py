@@ -94,19 +94,18 @@ class _Check:
         self.params = copy.deepcopy(dict(student.params))
         if not self._has_initial_state():
             return None
-        work = Work()
-        work.begin()
+        self.work = Work()
         with judge_memory(found, f"{self.role}()", self.subject, self.role, clauses.NO_MEMORY, self.budget) as memory:
             self._drive()
-            work.end()
             memory.calls, memory.params = self.calls, self.params
         if not found.faults:
             self._judge_rest()
             if self.role == "advance":
                 self._judge_two_steps()
         best = [min(ns, memory.ns.get(k, ns)) for k, ns in enumerate(self.ns)]
-        first = min(self.ns[0], memory.first_ns or self.ns[0]) if self.ns else 0
-        self.timing = judge_time(found, f"{self.role}()", best, first, work.close(), self.T)
+        own = self.ns[0] - (self.work.first_waited or 0) if self.ns else 0
+        first = min(own, memory.first_ns or own)
+        self.timing = judge_time(found, f"{self.role}()", best, first, self.work.close(), self.T)
         return None
 
     def _has_initial_state(self) -> bool:
@@ -195,6 +194,7 @@ class _Check:
         """What the function says, if it says it properly: a fault is noted otherwise."""
         arguments = self._arguments(t, x.copy(), u)
         before = copy.deepcopy(arguments)
+        self.work.begin()
         started = time.perf_counter_ns()
         try:
             answer = self.function(*arguments, params)
@@ -203,6 +203,7 @@ class _Check:
             self.found.fault(clauses.RUNS, f"{self.role}() failed {situation}: {student_error(error, self.source)}")
             return None
         self.ns.append(time.perf_counter_ns() - started)
+        self.work.end()
         if fault := vector_fault(answer, len(self.x0)):
             self.found.fault(fault[0], f"{self.role}() returned {fault[1]} {_situation(x, u)}; {fault[2]}")
             return None

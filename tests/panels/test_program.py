@@ -266,7 +266,7 @@ def test_a_program_is_run_from_its_cursor_and_by_the_nodes_a_line_by_hand_and_th
     for line, said in (
         ("G1 X2 F600", 'td:text-is("G1 X2 F600"):visible'),
         ("G91", 'td:text-is("G91"):visible'),
-        ("G1 X", '.rds-notice:has-text("mdi.ngc:3:5")'),
+        ("G1 X", '.rds-notice:has-text("mdi.ngc:3:4")'),
     ):
         page.fill('input[placeholder="G0 X10"]', line)
         page.keyboard.press("Enter")

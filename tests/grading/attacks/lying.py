@@ -136,5 +136,5 @@ ATTACKS = {
     "voltages and params that are pickled as something else": Attack(
         "import os\nclass V(float):\n    def __reduce_ex__(self, protocol): return os._exit, (0,)\nclass P(dict):\n    __class__ = dict\n    __reduce_ex__ = V.__reduce_ex__\n    def __deepcopy__(self, memo): os._exit(3)\nparams = P(a=1.0)\ndef control(t, r, y, state, params):\n    return V(1.0), V(2.0)\n"
     ),
-    "a text that no parser can nest": Attack("x = " + "-" * 100_000 + "1", LOAD, "MemoryError|RecursionError|nested"),
+    "a text that no parser can nest": Attack("x = " + "-" * 100_000 + "1", LOAD, "too deep in each other|nested"),
 }
