@@ -105,8 +105,9 @@ def _ticks_kept(every: Sequence[Any]) -> Iterator[None]:
     try:
         yield
     finally:
-        for axis in kept:
-            del axis._update_ticks, axis._get_ticklabel_bboxes
+        for axis in kept:  # of a drawing within this one, as a widget's for its background, it is taken off already
+            for name in ("_update_ticks", "_get_ticklabel_bboxes"):
+                vars(axis).pop(name, None)
 
 
 def _kept_of(axis: Any) -> tuple[Callable[[], Any], Callable[[Any, Any], Any]]:

@@ -141,6 +141,8 @@ def test_a_row_of_units_of_which_some_are_unknown_costs_no_name(tmp_path: Path) 
     assert list(table.columns)[1:3] == ["Input voltage", "Motor temperature"]
     table = read_table(written(tmp_path, "b.csv", "Motor,Test,Run\ntime,V,A\n", [T, U, X], ","))
     assert list(table.columns) == ["time", "V", "A"]  # names below a title
+    table = read_table(written(tmp_path, "c.csv", "Axis,Axis,Axis\nt,V,mm\n", [T, U, X], ","))
+    assert list(table.columns) == ["t", "V", "mm"]
 
 
 def test_a_first_row_of_nan_is_no_heading(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made_results import make_result
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.image import imread
 from matplotlib.text import Text
 
@@ -195,6 +196,21 @@ def test_pictures_are_drawn_in_any_thread_and_show_themselves(result: Result) ->
         pictures = list(pool.map(lambda _: result.plot()._repr_png_(), range(2)))
     assert len(set(pictures)) == 1
     assert pictures[0].startswith(b"\x89PNG")
+
+
+def test_a_picture_is_drawn_within_its_own_drawing(result: Result) -> None:
+    """As matplotlib's selectors do, which draw anew for a background without themselves."""
+    picture = result.plot()
+    canvas, drawn = FigureCanvasAgg(picture), list[bool]()
+
+    def again(_: Any) -> None:
+        drawn.append(True)
+        if len(drawn) == 1:
+            canvas.draw()
+
+    canvas.mpl_connect("draw_event", again)
+    canvas.draw()
+    assert len(drawn) == 2 and "_update_ticks" not in vars(picture.axes[0].xaxis)
 
 
 def test_no_pyplot() -> None:

@@ -224,6 +224,7 @@ def test_the_diagram_shows_the_parts_of_each_mode(tmp_path: Path, kind: str, mod
     assert all(exchanger("de")(block.title) for block in drawn.blocks)
     svg = diagram_svg(drawn)
     assert svg.count("<rect") == len(blocks) and 'aria-label="' in svg
+    assert svg.count('z" fill=') == len(drawn.links) and "url(" not in svg  # heads, of no part of a panel out of sight
 
 
 def test_names_of_the_users_cannot_break_the_drawing(tmp_path: Path) -> None:

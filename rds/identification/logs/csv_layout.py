@@ -454,7 +454,8 @@ def _seem_units(cells: Sequence[str], names: Sequence[str], decimal: str) -> boo
     known = sum(dimension(cell.strip("[]() ")) is not None for cell in given)
     other = sum(_OTHER_UNITS.fullmatch(cell.strip("[]() ")) is not None for cell in given)
     words = all(not is_number(cell, decimal) for cell in (*cells, *names)) and all(names)
-    words &= not any(cell.casefold().startswith(_TIME_NAMES) for cell in given)  # a row of names below a title
+    # a row of names below a title: `t V mm` names its columns by their units
+    words &= not any(cell.strip("[]() ") == "t" or cell.casefold().startswith(_TIME_NAMES) for cell in given)
     return words and known > 0 and 2 * (known + other) >= len(given)
 
 

@@ -25,8 +25,6 @@ def diagram_svg(diagram: Diagram) -> str:
     return (
         f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{escape(diagram.sentence)}" '
         f'style="width: 100%; max-width: {width}px; height: auto" font-size="13" fill="var(--rds-text)">'
-        '<defs><marker id="rds-arrow" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" markerHeight="8" '
-        'orient="auto"><path d="M0 0L8 4L0 8z" fill="var(--rds-text)"/></marker></defs>'
         f"{''.join(drawn)}</svg>"
     )
 
@@ -58,6 +56,9 @@ def _text(x: float, y: float, text: str, style: str) -> str:
 
 def _link(link: Link, start: Block, end: Block, rows: int) -> str:
     (x0, y0), (x1, y1) = _place(start), _place(end)
+    head = f"M{x1 - 8} {y1 + _HEIGHT / 2 - 4:g}l8 4l-8 4z"  # to the right, into the block
+    if link.back or end.row < start.row:
+        head = f"M{x1 + _WIDTH / 2 - 4:g} {y1 + _HEIGHT + 8}l4 -8l4 8z"  # up, from under it
     if link.back:
         low = _TOP + rows * _ROW + 6
         # a little to the right of the middle, where nothing of a second row ends
@@ -76,4 +77,5 @@ def _link(link: Link, start: Block, end: Block, rows: int) -> str:
         down = y1 + _HEIGHT / 2
         path = f"M{x0 + _WIDTH / 2:g} {y0 + _HEIGHT}V{down:g}H{x1}"
         label = _text(x0 + _WIDTH / 2 + 8, down + 18, link.label, "")
-    return f'<path d="{path}" fill="none" stroke="var(--rds-text)" marker-end="url(#rds-arrow)"/>{label}'
+    # no marker: browsers draw none whose definition is in a panel out of sight, where one of the same name may stand
+    return f'<path d="{path}" fill="none" stroke="var(--rds-text)"/><path d="{head}" fill="var(--rds-text)"/>{label}'
