@@ -99,8 +99,7 @@ class _Run:
         if not found.faults:
             self._probe()
         best = [min(ns, memory.ns.get(k, ns)) for k, ns in enumerate(self.ns)]
-        own = self.ns[0] - (self.work.first_waited or 0) if self.ns else 0
-        first = min(own, memory.first_ns or own)
+        first = min(self.ns[0], memory.first_ns or self.ns[0]) if self.ns else 0
         self.timing = judge_time(found, "control()", best, first, self.work.close(), self.T)
 
     def _drive(self) -> None:
@@ -131,12 +130,14 @@ class _Run:
         except Exception as error:
             return self._cannot_be_copied(state, error)
         self.work.begin()
+        waited = 0 if self.ns else self.work.waited()
         started = time.perf_counter_ns()
         try:
             answer = self.function(t, r, y, state, params)
         except STUDENT_ERRORS as error:
             return self._failed(error, t, before)
-        self.ns.append(time.perf_counter_ns() - started)
+        took = time.perf_counter_ns() - started
+        self.ns.append(took if self.ns else max(0, took - (self.work.waited() - waited)))
         self.work.end()
         if not self._judge_arguments(before, (t, r, y, state), params) or not self._judge_answer(answer, t):
             return None

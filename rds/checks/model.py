@@ -95,16 +95,17 @@ class _Check:
         if not self._has_initial_state():
             return None
         self.work = Work()
+        self.work.begin()
         with judge_memory(found, f"{self.role}()", self.subject, self.role, clauses.NO_MEMORY, self.budget) as memory:
             self._drive()
+            self.work.end()
             memory.calls, memory.params = self.calls, self.params
         if not found.faults:
             self._judge_rest()
             if self.role == "advance":
                 self._judge_two_steps()
         best = [min(ns, memory.ns.get(k, ns)) for k, ns in enumerate(self.ns)]
-        own = self.ns[0] - (self.work.first_waited or 0) if self.ns else 0
-        first = min(own, memory.first_ns or own)
+        first = min(self.ns[0], memory.first_ns or self.ns[0]) if self.ns else 0
         self.timing = judge_time(found, f"{self.role}()", best, first, self.work.close(), self.T)
         return None
 
@@ -194,7 +195,7 @@ class _Check:
         """What the function says, if it says it properly: a fault is noted otherwise."""
         arguments = self._arguments(t, x.copy(), u)
         before = copy.deepcopy(arguments)
-        self.work.begin()
+        waited = 0 if self.ns else self.work.waited()
         started = time.perf_counter_ns()
         try:
             answer = self.function(*arguments, params)
@@ -202,8 +203,8 @@ class _Check:
             situation = _situation(x, u)
             self.found.fault(clauses.RUNS, f"{self.role}() failed {situation}: {student_error(error, self.source)}")
             return None
-        self.ns.append(time.perf_counter_ns() - started)
-        self.work.end()
+        took = time.perf_counter_ns() - started
+        self.ns.append(took if self.ns else max(0, took - (self.work.waited() - waited)))
         if fault := vector_fault(answer, len(self.x0)):
             self.found.fault(fault[0], f"{self.role}() returned {fault[1]} {_situation(x, u)}; {fault[2]}")
             return None

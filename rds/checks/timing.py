@@ -20,7 +20,6 @@ class Work:
         self._account = ThreadTime()
         self._span = self._worked = 0  # ns
         self._begun = (0, 0, 0)
-        self.first_waited: int | None = None  # ns of the first call in which others had the processor
 
     def begin(self) -> None:
         """The function is called."""
@@ -30,8 +29,10 @@ class Work:
         """It has returned. Time in which others had the processor is not its own."""
         span, waited, worked = (now - begun for now, begun in zip(self._now(), self._begun, strict=True))
         self._span, self._worked = self._span + span - waited, self._worked + worked
-        if self.first_waited is None:
-            self.first_waited = waited
+
+    def waited(self) -> int:
+        """ns so far in which others had the processor; what the first call waits is not its own."""
+        return self._account.waited()
 
     def close(self) -> float:
         """The fraction of its time in which it worked."""

@@ -87,6 +87,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     for name in (*found.unmoved, *open_ended):
         covariance[order.index(name), :] = covariance[:, order.index(name)] = 0.0
         covariance[order.index(name), order.index(name)] = np.inf
+    errors = dict(zip(order, np.sqrt(np.diag(covariance)), strict=True))
     return made_estimate(
         structure,
         SIMULATION_ERROR,
@@ -103,7 +104,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
                 for name in open_ended
             ),
         ],
-        warnings=suspicions(problem, solution, uncertainty),
+        warnings=suspicions(problem, solution, uncertainty, errors),
         details={
             "fixed": dict(fixed),
             "evaluations": solution.evaluations,

@@ -23,12 +23,15 @@ _OF_TAU = 0.5  # of the sample period: a time constant that is shorter is told b
 _TWINS = 0.99  # correlation from which two parameters are told together rather than each
 _TIMES = (1e-4, 10.0)  # s: time constants of the axes of machine tools
 _SPEEDS = (0.05, 5000.0)  # mm/s: the highest speed of a log
+_WITHIN = 3.0  # standard errors by which noise alone asks for a value beyond a bound
 
 
-def suspicions(problem: Problem, solution: Solution, uncertainty: Uncertainty) -> list[str]:
-    """Sentences with numbers, units and what to look at."""
+def suspicions(
+    problem: Problem, solution: Solution, uncertainty: Uncertainty, errors: Mapping[str, float]
+) -> list[str]:
+    """Sentences with numbers, units and what to look at; `errors` are the standard errors of the parameters."""
     values = problem.values(solution.point)
-    said = [*_search(problem, solution), *_implausible(problem, values), *contradictions(problem, solution)]
+    said = [*_search(problem, solution, errors), *_implausible(problem, values), *contradictions(problem, solution)]
     for number, log in enumerate(problem.logs):
         error = problem.residuals(solution.point, number)[0]
         said += fitted_doubts(problem.structure, log, error)
@@ -38,7 +41,7 @@ def suspicions(problem: Problem, solution: Solution, uncertainty: Uncertainty) -
     return said + _twins(problem.names, uncertainty)
 
 
-def _search(problem: Problem, solution: Solution) -> list[str]:
+def _search(problem: Problem, solution: Solution, errors: Mapping[str, float]) -> list[str]:
     said = []
     if not solution.converged:
         said.append(
@@ -47,14 +50,15 @@ def _search(problem: Problem, solution: Solution) -> list[str]:
             "start from (--start), hold a parameter (--fix), or fit fewer options"
         )
     values = problem.values(solution.point)
-    for name, side in zip(problem.names, solution.at_bound, strict=False):
+    for name, side, beyond in zip(problem.names, solution.at_bound, solution.step, strict=False):
         if side:
             meaning = problem.structure.parameters[name].described
-            conclusion = (
-                "these data show nothing of it; fit without that option"
-                if name in problem.structure.neutral and side < 0
-                else "the data ask for a value beyond it, so the structure, a sign or a unit is wrong"
-            )
+            if name in problem.structure.neutral and side < 0:
+                conclusion = "these data show nothing of it; fit without that option"
+            elif abs(beyond) > _WITHIN * errors[name]:
+                conclusion = "the data ask for a value beyond it, so the structure, a sign or a unit is wrong"
+            else:  # as of an axis without friction
+                continue
             said.append(f"{name} = {values[name]:.4g} lies at its bound ({meaning}): {conclusion}")
     return said
 
