@@ -94,9 +94,9 @@ def test_what_is_cut_or_damaged_is_told(tmp_path: Path) -> None:
 
 
 def test_decimal_commas_between_commas_are_refused_and_no_comments(tmp_path: Path) -> None:
-    text = (FILE_HEAD.replace("Tab", "Comma") + without_times(comment="\t7")).replace(",", ".").replace("\t", ",")
+    text = (FILE_HEAD.replace("Tab", "Comma") + without_times(comment="\t")).replace(",", ".").replace("\t", ",")
     path = tmp_path / "a.lvm"
-    path.write_text("\n".join(text.splitlines()[:-1]) + "\n,1,2,no number\n")
+    path.write_text("\n".join(text.splitlines()[:-1]) + "\n,1,2,7\n")
     assert np.allclose(read_table(path).columns["Position"].values, [*X[:-1], 2.0])
     rows = text.index("Comment\n") + len("Comment\n")
     path.write_text(text[:rows] + text[rows:].replace(".", ","))

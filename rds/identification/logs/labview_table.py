@@ -60,7 +60,7 @@ class _Recording:
         if len(cells) > width:
             if not self.comments and any(cells[width:]):
                 raise InputError(f"it has {len(cells)} cells under {width} headings; repair or remove the line", place)
-            self.beyond += self.comma and all(map(_is_number, filter(None, cells[width:])))
+            self.beyond += self.comma and any(cells[width:]) and all(map(_is_number, filter(None, cells[width:])))
             self.said += any(cells[width:])
         self.numbers.extend(_number(cell, place) for cell in cells[:width])
         self.numbers.extend([np.nan] * (width - len(cells)))
