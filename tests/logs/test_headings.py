@@ -131,6 +131,8 @@ def test_a_scope_with_one_time_for_all_channels(head: str, stamp: int, tmp_path:
     path.write_text(above + head + "\n".join(rows) + "\n", encoding="utf-8")
     (log,) = read_log(path)
     assert np.allclose(log.time - log.time[0], T / 1e3, atol=3e-6)
+    path.write_text(above + head + "\n".join([f";{X[0]:.6f};{U[0]:.6f}", *rows]) + "\n", encoding="utf-8")
+    assert np.nanmax(read_table(path).columns["time"].values) == pytest.approx(T[-1], abs=3e-3)  # a blank comes first
     assert np.allclose(log.position, X, atol=1e-6) and np.allclose(log.command, U, atol=1e-6)
 
 

@@ -63,6 +63,12 @@ def test_recordings_one_after_another_are_joined_by_their_times_of_day(tmp_path:
     table = read_table(saved(tmp_path, text))
     assert np.allclose(table.columns["time"].values, np.r_[1e-3 * K, 1.75 + 1e-3 * K])
     assert any("comments beside 80 rows" in finding.what for finding in table.findings)
+    cut = text.splitlines(keepends=True)[:-5]
+    assert any(
+        "announce 80 samples, and there are 75" in f.what for f in read_table(saved(tmp_path, "".join(cut))).findings
+    )
+    with pytest.raises(InputError, match=r"unit of Position has changed \(mm before, m here\)"):
+        read_table(saved(tmp_path, text + head(("{}", "{}")).replace("mm", "m") + heading + rows))
     with pytest.raises(InputError, match=r"other channels.*file of its own"):
         read_table(saved(tmp_path, text + text.replace("Position", "Speed")))
 
@@ -78,5 +84,21 @@ def test_what_is_cut_or_damaged_is_told(tmp_path: Path) -> None:
     assert any("announces 80 samples, and there are 40" in finding.what for finding in table.findings)
     with pytest.raises(InputError, match=r"'0,5\?' is no number"):
         read_table(saved(tmp_path, without_times() + "\t0,5?\t1\n"))
+    table = read_table(saved(tmp_path, without_times()[:-5]))  # of 19,500000
+    assert any("its last line has no end" in f.what for f in table.findings)
+    assert len(table.columns["Position"].values) == 39 and table.columns["Position"].values[-1] == 19.0
+    with pytest.raises(InputError, match="no line of Channels"):
+        read_table(saved(tmp_path, without_times().replace("Channels", "Channel")))
     with pytest.raises(InputError, match="no samples"):
         read_table(saved(tmp_path, head(("{}", "{}"))))
+
+
+def test_decimal_commas_between_commas_are_refused_and_no_comments(tmp_path: Path) -> None:
+    text = (FILE_HEAD.replace("Tab", "Comma") + without_times(comment="\t")).replace(",", ".").replace("\t", ",")
+    path = tmp_path / "a.lvm"
+    path.write_text("\n".join(text.splitlines()[:-1]) + "\n,1,2,7\n")
+    assert np.allclose(read_table(path).columns["Position"].values, [*X[:-1], 2.0])
+    rows = text.index("Comment\n") + len("Comment\n")
+    path.write_text(text[:rows] + text[rows:].replace(".", ","))
+    with pytest.raises(InputError, match="record it with Tab between cells"):
+        read_table(path)

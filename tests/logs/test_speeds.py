@@ -247,3 +247,24 @@ def test_one_speed_tells_no_gain_though_a_few_samples_at_rest_seem_to_tell_frict
     assert gain.low <= 60.0 <= gain.high
     held = fit([with_findings(log)], made, options={"fixed": {"friction_plus": 65.0, "friction_minus": -65.0}})
     assert held.parameters["K"].value == pytest.approx(60.0, rel=0.01) and held.parameters["K"].std_error < 0.5
+
+
+def test_one_speed_each_way_tells_no_gain_however_long_the_axis_rests_before() -> None:
+    """K was 26.574 with a standard error of 0.009 of a motor whose gain is 32.618: friction was called zero."""
+    t, made, truth = 0.002 * np.arange(413), structure("axis", (), "rev/min"), {"tau": 0.107, "K": 32.618}
+    truth |= {"friction_plus": 33.0, "friction_minus": -33.0}
+    draw = np.random.default_rng(5)
+
+    def steps(*levels: float) -> list[Log]:
+        commands = [np.where(t >= 0.076, level, 0.0) for level in levels]
+        noisy = [made.respond(t, u, (0.0,), truth) + 0.2 * draw.standard_normal(len(t)) for u in commands]
+        units = {"position": "rev/min", "command": "V"}
+        return [
+            with_findings(Log(f"{level:g}", t, u, y, units=units, closed_loop=False))
+            for level, u, y in zip(levels, commands, noisy, strict=True)
+        ]
+
+    for levels in ((5.5,), (5.5, -5.5)):
+        assert fit(steps(*levels), made).parameters["K"].std_error == np.inf
+    gain = fit(steps(5.5, 8.0), made).parameters["K"]
+    assert gain.low <= 32.618 <= gain.high and gain.std_error < 0.1

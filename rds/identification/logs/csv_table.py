@@ -154,7 +154,8 @@ def _from_filetime(columns: Mapping[str, Column], at: Sequence[int]) -> dict[str
     """The columns with times in ms, where TwinCAT's scope wrote full stamps: Windows' FILETIME, in steps of 100 ns."""
     listed = [*columns.values()]
     stamps = [listed[i] for i in at if listed[i].unit == "ms"]
-    begins = [column.values[0] for column in stamps if len(column.values)]
+    known = [column.values[np.isfinite(column.values)] for column in stamps]
+    begins = [float(values[0]) for values in known if len(values)]
     if len(stamps) < len(at) or not begins or not min(begins) > _FILETIME:
         return dict(columns)
     since = {id(column): replace(column, values=(column.values - min(begins)) * 1e-4) for column in stamps}

@@ -7,7 +7,7 @@ from math import ceil
 
 import numpy as np
 
-from rds.identification.logs.log import Finding, Gravity, Log, excited_part
+from rds.identification.logs.log import Finding, Gravity, Log
 from rds.identification.logs.motion import motion, noise, travel
 from rds.machines.machine import Axis
 
@@ -85,11 +85,22 @@ def has_one_level(log: Log) -> bool:
 
 
 def steps_to_one_level(logs: Sequence[Log]) -> bool:
-    """Whether each log goes from rest to one level of command and stays there, and all go to the same: one speed."""
-    after = [excited_part(log, len(log)).command[1:] for log in logs]
-    largest = max(float(np.abs(command).max(initial=0.0)) for command in after)
-    before = [log.command[0] if np.ptp(log.command) else 0.0 for log in logs]
-    return not any(before) and float(np.ptp(np.concatenate(after))) <= _LEVEL * largest
+    """Whether each log goes from rest to one level of command and stays there, and all that go the same way go to the
+    same: one speed each way. A log that stays at rest is passed over.
+    """
+    ways: dict[float, list[np.ndarray]] = {1.0: [], -1.0: []}
+    for log in logs:
+        changes = np.flatnonzero(np.diff(log.command))
+        if is_at_rest(log):
+            continue
+        if len(changes) and log.command[0] != 0.0:
+            return False
+        after = log.command[changes[0] + 1 :] if len(changes) else log.command
+        way = float(np.sign(after[-1]))
+        if way == 0.0 or float((way * after).min()) <= 0.0:
+            return False
+        ways[way].append(after)
+    return all(_levels(np.concatenate(parts), way) <= 1 for way, parts in ways.items() if parts)
 
 
 def is_steady(log: Log) -> bool:

@@ -48,17 +48,19 @@ _DAY = 86400.0  # s
 class _Recording:
     """One head with its rows: `label -> cells`, the headings, and the numbers row by row (NaN where there is none)."""
 
-    def __init__(self, head: Mapping[str, Sequence[str]], headings: Sequence[str], place: str):
-        self.head, self.place = head, place
+    def __init__(self, head: Mapping[str, Sequence[str]], headings: Sequence[str], comma: bool, place: str):
+        self.head, self.comma, self.place = head, comma, place
         self.comments = headings[-1:] == [_COMMENT]
         self.headings = list(headings[: len(headings) - self.comments])
         self.numbers, self.said = array("d"), 0  # rows one after another; comments that say something
+        self.beyond = 0  # rows with numbers in place of a comment, or in front of one
 
     def add(self, cells: Sequence[str], place: str) -> None:
         width = len(self.headings)
         if len(cells) > width:
             if not self.comments and any(cells[width:]):
                 raise InputError(f"it has {len(cells)} cells under {width} headings; repair or remove the line", place)
+            self.beyond += self.comma and any(cells[width:]) and all(map(_is_number, filter(None, cells[width:])))
             self.said += any(cells[width:])
         self.numbers.extend(_number(cell, place) for cell in cells[:width])
         self.numbers.extend([np.nan] * (width - len(cells)))
@@ -70,6 +72,9 @@ class _Recording:
         """What the head says under `label` of a column."""
         cells = self.head.get(label, ())
         return cells[column] if column < len(cells) and cells[column] else default
+
+    def unit(self, column: int) -> str | None:
+        return self.at("Y_Unit_Label", column) or None
 
 
 def is_labview(path: Path) -> bool:
@@ -84,18 +89,28 @@ def read_labview(path: Path) -> Table:
     Times are those of the columns X_Value, else they follow from X0 and Delta_X. Recordings one after another are
     joined by the times of day in their heads. InputError, with the line, for a row that is damaged.
     """
-    recordings = _recordings(path)
+    findings: list[Finding] = []
+    recordings = _recordings(path, findings)
     if not recordings:
         raise InputError("it has heads and no samples; record it again or take another copy", str(path))
-    first, findings = recordings[0], list[Finding]()
+    first = recordings[0]
     channels = [i for i, name in enumerate(first.headings) if i and name != _X]
     names = unique([first.headings[i] for i in channels], findings)
     times: dict[int, list[np.ndarray]] = {i: [] for i in channels}
     values: dict[int, list[np.ndarray]] = {i: [] for i in channels}
     for recording in recordings:
+        if 2 * recording.beyond * len(recording.headings) > len(recording.numbers):
+            what = "numbers stand beyond its channels, as where commas are decimal ones and divide cells, too"
+            raise InputError(f"{what}; record it with Tab between cells", recording.place)
         if recording.headings != first.headings:
             what = f"this recording has other channels than the first one ({', '.join(recording.headings):.80})"
             raise InputError(f"{what}; put each into a file of its own, with the head of the file", recording.place)
+        if changed := [i for i in channels if first.unit(i) != recording.unit(i)]:
+            units = f"{first.unit(changed[0])} before, {recording.unit(changed[0])} here"
+            what = f"the unit of {first.headings[changed[0]]} has changed ({units})"
+            raise InputError(
+                f"{what}; put each recording into a file of its own, with the head of the file", recording.place
+            )
         since = _since(first, recording)
         for i in channels:
             x, y = _samples(recording, i)
@@ -104,7 +119,7 @@ def read_labview(path: Path) -> Table:
             values[i].append(y)
     columns, empty = {}, []
     for i, name in zip(channels, names, strict=True):
-        own, unit = np.concatenate(values[i]), first.at("Y_Unit_Label", i) or None
+        own, unit = np.concatenate(values[i]), first.unit(i)
         bare, headed = name_and_unit(name)
         if headed is not None and (unit is None or plain(headed) == plain(unit)) and dimension(headed):
             name, unit = (bare if bare not in columns else name), headed
@@ -121,34 +136,45 @@ def read_labview(path: Path) -> Table:
     if len(recordings) > 1:
         what = f"{len(recordings)} recordings stand in it one after another; their times of day join them"
         findings.append(Finding("clock", what))
-    announced = max((int(cell) for cell in first.head.get("Samples", ()) if cell.isdecimal()), default=0)
+    announced = sum(
+        max((int(cell) for cell in each.head.get("Samples", ()) if cell.isdecimal()), default=0) for each in recordings
+    )
     rows = max(len(column.values) for column in columns.values())
     if announced > rows:  # a head may announce the first of many parts
-        findings.append(missing_samples(announced, rows, "its head announces"))
+        told = "its head announces" if len(recordings) == 1 else "its heads announce"
+        findings.append(missing_samples(announced, rows, told))
     if np.isnan(first.table()[:, 0]).all():
         findings += _of_step(first.at("Delta_X", channels[0]).replace(",", "."))
     dimensions = {first.at("X_Dimension", i, "Time") for i in channels}
     return Table(path, "labview", _timed(columns, dimensions, path), findings=tuple(findings))
 
 
-def _recordings(path: Path) -> list[_Recording]:
-    """The recordings that have rows."""
+def _recordings(path: Path, findings: list[Finding]) -> list[_Recording]:
+    """The recordings that have rows. A last line without its end is left out, which the findings tell."""
     remedy = "record a shorter stretch, or the channels of the axis alone"
-    lines = decoded(read_limited(path, _MOST, "a measurement of LabVIEW", remedy)).splitlines()
+    lines = decoded(read_limited(path, _MOST, "a measurement of LabVIEW", remedy)).splitlines(keepends=True)
+    if lines[-1].strip() and lines[-1].splitlines() == [lines[-1]]:
+        what = f"its last line has no end, as where a file was cut ({lines.pop().strip()!r:.40}): it is left out"
+        findings.append(Finding("cut", what, Gravity.WARNING))
     comma = any(line.startswith("Separator,") for line in lines[:20])
     found: list[_Recording] = []
-    head: dict[str, Sequence[str]] | None = {}  # None below a heading, among rows
+    head: dict[str, Sequence[str]] | None = {_MARK: ()}  # None below a heading, among rows
     awaited = False  # the row of headings is the next
     for number, line in enumerate(lines[1:], 2):
         cells = [cell.strip() for cell in line.split("," if comma else "\t")]
-        if cells[0] == _END:
-            awaited, head = head is not None and "Channels" in head, head or {}
+        if line.startswith(_END):
+            head = head or {}
+            awaited = "Channels" in head
+            if not awaited and head.pop(_MARK, None) is None:
+                raise InputError(
+                    "the head above it has no line of Channels; take another copy", f"{path}, line {number}"
+                )
         elif not any(cells):
             continue
         elif awaited:
             while not cells[-1]:
                 cells.pop()
-            found.append(_Recording(dict(head or {}), cells, f"{path}, line {number}"))
+            found.append(_Recording(dict(head or {}), cells, comma, f"{path}, line {number}"))
             head, awaited = None, False
         elif head is not None:
             head[cells[0]] = cells
@@ -223,3 +249,11 @@ def _number(cell: str, place: str) -> float:
     except ValueError:
         raise InputError(f"{cell!r:.40} is no number; repair or remove the line", place) from None
     return value if isfinite(value) else np.nan
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
