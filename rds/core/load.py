@@ -149,9 +149,10 @@ def from_function(
 
 def _system(variables: Mapping[str, Any]) -> str:
     """Where a python-control system of the file goes, which fills no interface there; empty if there is none."""
-    name = next((name for name, value in variables.items() if is_control_system(value)), None)
-    if name is None:
+    names = [name for name, value in variables.items() if is_control_system(value)]
+    if not names:
         return ""
+    name = names[-1]  # the ones before it, such as s = tf("s"), are what it was made of
     return f"`{name}` is a system of python-control: hand it in in Python, as in `rds.Experiment(model={name})`"
 
 

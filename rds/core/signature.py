@@ -30,13 +30,20 @@ def form(name: str) -> str:
     return f"{name}({', '.join(ARGUMENTS[name])})"
 
 
+_STEPS = {  # of a linear system's matrices
+    "control": "return C @ x + D @ u and the next state A @ x + B @ u",
+    "derivatives": "return A @ x + B @ u",
+    "advance": "return A @ x + B @ u",
+}
+
+
 def argument_fault(name: str, function: Callable[..., Any]) -> str | None:
     """What is wrong with the arguments of `function` in the role `name`, with the remedy; None if nothing is."""
     wanted = ARGUMENTS[name]
     if type(function).__module__.partition(".")[0] == "control":
         kind = type(function).__name__
-        steps = "return C @ x + D @ u and the next state A @ x + B @ u"
-        return f"`{name}` is a {kind} of python-control, and no function: write `def {form(name)}`; in it {steps}"
+        steps = f"; in it {_STEPS[name]}" if name in _STEPS and hasattr(function, "A") else ""
+        return f"`{name}` is a {kind} of python-control, and no function: write `def {form(name)}`{steps}"
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # built-in and compiled functions need not tell

@@ -122,6 +122,8 @@ def result_fragment(result: Result) -> str:
 def ending(result: Result) -> str:
     """How the run came to its end, with the reason where it gave one."""
     reason = str(result.meta.get("ending_reason") or "")
+    if reason.startswith("emergency stop"):  # the machine is there, and was told to stop
+        return reason
     return str(result.meta.get("ending")) + (f" ({reason})" if reason else "")
 
 

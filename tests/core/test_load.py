@@ -320,3 +320,9 @@ def test_a_file_of_a_python_control_system_alone_is_told_where_that_goes(write):
     system = write("import control\naxis = control.tf([176.0], [1.0, 100.0, 0.0])\n")
     with pytest.raises(InputError, match=r"`axis` is a system of python-control.*Experiment\(model=axis\)"):
         load_student(system)
+    made = write("import control\ns = control.tf('s')\nmodel = 176.0 / (s * (s + 100.0))\n")
+    with pytest.raises(InputError, match=r"`model` is a system of python-control.*Experiment\(model=model\)"):
+        load_student(made)
+    named = write("import control\nderivatives = control.ss([[0, 1], [0, -9]], [[0], [1]], [[1, 0]], 0)\n")
+    with pytest.raises(InputError, match=r"write `def derivatives\(t, x, u, params\)`; in it return A @ x \+ B @ u$"):
+        load_student(named)

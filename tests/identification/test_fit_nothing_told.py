@@ -78,3 +78,17 @@ def test_two_that_come_only_together_are_told_with_what_is_known_of_them(second:
     told = Uncertainty(np.eye(4) * 1e-6, (), (change,), 1, 100.0, 0.1)
     (sentence,) = unidentifiable_by(made, names, values, told)
     assert sentence == f"tau and K come only as their {word}: these data cannot tell them apart"
+
+
+def test_an_axis_without_friction_is_no_alarm_and_one_that_friction_pushes_is() -> None:
+    def at_bound(start: float, **friction: float) -> tuple[list[str], list[str]]:
+        u = square(2.0)
+        estimate = fit([log(u, moved(u, X | friction, STEP, start))], AXIS)
+        return estimate.details["at_bound"], [warning for warning in estimate.warnings if "bound" in warning]
+
+    free = [at_bound(start, friction_plus=0.0, friction_minus=0.0) for start in (0.7, 0.70065)]
+    assert [names for names, _ in free] == [["friction_minus"], ["friction_plus"]]
+    assert not any(warnings for _, warnings in free)
+    names, warnings = at_bound(0.7, friction_plus=-0.02, friction_minus=0.0)
+    assert names == ["friction_plus"]
+    assert warnings[0].startswith("friction_plus = 0 lies at its bound") and "ask for a value beyond it" in warnings[0]

@@ -49,7 +49,6 @@ def _search(problem: Problem, solution: Solution, errors: Mapping[str, float]) -
             "values are the best so far, and the intervals are widened by what seemed left to go. Give other values to "
             "start from (--start), hold a parameter (--fix), or fit fewer options"
         )
-    values = problem.values(solution.point)
     for name, side, beyond in zip(problem.names, solution.at_bound, solution.step, strict=False):
         if side:
             meaning = problem.structure.parameters[name].described
@@ -59,7 +58,8 @@ def _search(problem: Problem, solution: Solution, errors: Mapping[str, float]) -
                 conclusion = "the data ask for a value beyond it, so the structure, a sign or a unit is wrong"
             else:  # as of an axis without friction
                 continue
-            said.append(f"{name} = {values[name]:.4g} lies at its bound ({meaning}): {conclusion}")
+            bound = problem.structure.bounds(name)[0 if side < 0 else 1]
+            said.append(f"{name} = {bound:.4g} lies at its bound ({meaning}): {conclusion}")
     return said
 
 
