@@ -53,9 +53,8 @@ def _watch(running: ProgramRun, folder: Path) -> None:
                 continue
             before = status.state
             if _STATES[before] in ("stops", "waits for the tool", "held"):
-                typer.echo(
-                    f"rds: line {status.line}: {_STATES[before]}; `rds nc operate {folder} --resume` goes on", err=True
-                )
+                remedy = f"`rds nc operate {folder} --resume` in another terminal goes on"
+                typer.echo(f"rds: line {status.line}: {_STATES[before]}; {remedy}", err=True)
     except KeyboardInterrupt:
         running.stop()
 

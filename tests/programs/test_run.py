@@ -360,7 +360,7 @@ def test_a_program_is_operated_from_another_terminal(one_axis: list[str], alone:
     assert host.stderr is not None
     try:
         said = host.stderr.readline()
-        assert said == f"rds: line {STOP_LINE}: stops; `rds nc operate run --resume` goes on\n"
+        assert said == f"rds: line {STOP_LINE}: stops; `rds nc operate run --resume` in another terminal goes on\n"
         shown = CliRunner().invoke(app, ["nc", "operate", "run", "--json"])
         assert json.loads(shown.stdout)["override"] == 1.0
         wrong = CliRunner().invoke(app, ["nc", "operate", "run", "--set", "A.g1=3"])
