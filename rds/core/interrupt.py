@@ -101,7 +101,7 @@ def limited(steps: Callable[[], Any] = lambda: None, seconds: float | None = Non
     finally:
         try:
             over()
-        finally:  # once more where it was raised within that: the watcher would raise it for ever
+        finally:  # The error may have come within `over`: unless it is set, the watcher raises it for ever.
             over()
             if was_late:
                 _take_back(here)

@@ -66,7 +66,7 @@ function render({ model, el }) {
   window.addEventListener("blur", release);
   window.addEventListener("pagehide", release);
   document.addEventListener("visibilitychange", hidden);
-  const sight = new ResizeObserver(() => box.clientWidth || release()); // another panel is looked at
+  const sight = new ResizeObserver(() => box.clientWidth || release()); // 0: another panel is looked at
   sight.observe(box);
   const enable = () => {
     for (const button of buttons) button.disabled = model.get("disabled");

@@ -55,7 +55,7 @@ function render({ model, el }) {
   const hidden = () => document.hidden && stop();
   window.addEventListener("pagehide", stop);
   document.addEventListener("visibilitychange", hidden);
-  const sight = new ResizeObserver(() => box.clientWidth || stop()); // another panel is looked at
+  const sight = new ResizeObserver(() => box.clientWidth || stop()); // 0: another panel is looked at
   sight.observe(box);
   const enable = () => {
     for (const button of buttons) button.disabled = model.get("disabled");
