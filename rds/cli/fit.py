@@ -9,6 +9,7 @@ import typer
 
 from rds.cli.common import Json, named_values, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.logs import read_logs
+from rds.core.errors import InputError
 from rds.identification.structures import INVERSE_DYNAMICS, SIMULATION_ERROR
 
 if TYPE_CHECKING:
@@ -24,9 +25,9 @@ FITTED_SHARE = 0.6  # of each log, with --split; the rest validates
 def fit(
     logs: Annotated[list[Path], typer.Argument(help="Logs, fitted together: CSV, MAT, Parquet, bus logs, results.")],
     structure: Annotated[
-        str,
-        typer.Option("--structure", "-s", help="{structure}, or a model of your own: FILE.py."),
-    ],
+        str | None,
+        typer.Option("--structure", "-s", help="Needed: {structure}, or a model of your own: FILE.py."),
+    ] = None,
     method: Annotated[str | None, typer.Option("--method", "-m", help="{method}.")] = None,
     option: Annotated[
         list[str] | None, typer.Option("--option", help="Of the structure: viscous, stribeck, offset, delay, ...")
@@ -63,11 +64,13 @@ def fit(
         from rds.identification.fit.fit import fit as fit_model
         from rds.identification.fit.missing_options import with_hint
         from rds.identification.fit.model_file import check_place
-        from rds.identification.structures.structures import for_logs
+        from rds.identification.structures.structures import LIBRARY, for_logs
         from rds.identification.structures.structures import structure as structure_of
 
         if out is not None:  # before the fit, which may take a while
             check_place(out)
+        if structure is None:
+            raise InputError(f"give a --structure: {', '.join(LIBRARY.names())}, or a model of your own, FILE.py")
         made = structure_of(structure, option or ())
         options = _options(made, method, fix or [], free, start or [], set_ or [])
         with progress_bars() as bar:
@@ -107,7 +110,6 @@ def _options(
     made: Structure, method: str | None, fix: list[str], free: str | None, start: list[str], set_: list[str]
 ) -> dict[str, Any]:
     """The method's options. InputError for what it does not take."""
-    from rds.core.errors import InputError
 
     fixed = named_values(fix, "--fix", "tau=0.01")
     if free is not None:
@@ -126,7 +128,6 @@ def _options(
 
 def _others(made: Structure, free: str, fixed: dict[str, float]) -> dict[str, float]:
     """The parameters of the user's own file that are held, at the file's values."""
-    from rds.core.errors import InputError
     from rds.core.load import load_student
 
     if not made.name.endswith(".py"):

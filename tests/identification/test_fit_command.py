@@ -192,3 +192,9 @@ def test_files_that_cannot_be_fitted_are_refused(tmp_path: Path, text: str, sent
     path.write_text(text)
     with pytest.raises(InputError, match=sentence):
         fit([axis_log(FREE, seconds=0.3)], structure(path))
+
+
+def test_a_fit_without_a_structure_names_those_that_there_are(tmp_path: Path) -> None:
+    found = CliRunner().invoke(app, ["fit", str(csv(tmp_path / "log.csv", axis_log(X)))])
+    assert found.exit_code == 2
+    assert "give a --structure: axis, axis-mass, axis-inertia, spindle, or a model of your own" in found.stderr
