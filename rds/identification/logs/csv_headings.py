@@ -13,7 +13,8 @@ import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from rds.identification.logs.units import dimension
+from rds.identification.logs.csv_cells import BLANKS, COMMENTS, is_comment, is_number, split
+from rds.identification.logs.units import dimension, plain
 from rds.results.units import split_heading
 
 Split = Callable[[str], list[str]]
@@ -36,6 +37,13 @@ _PAIR_TIMES = {"sampletime[ms]": "ms", "interval": "s"}  # which label says in w
 _RIGOL = re.compile(r"(X,)?(CH\d,)+Start,Increment,?\s*")
 _NEWER_RIGOL = re.compile(r"(Time\(s\),)?((?:CH\d+[VAW],)+)\s*t0\s*=([^,]*),\s*tInc\s*=([^,]*),?\s*")
 _TIMES_ALONE = ("ms", "us", "µs", "μs")  # headings of a time by its unit; `s` may be a way, `min` a least one
+FEW = 20  # rows of data that are looked at for how they end
+# what stands in a row of units beside those of `units.py`
+_OTHER_UNITS = re.compile(
+    r"k?W|[°]?C|Deg C|degC|k?Hz|k?g|kgf|J|[AW]h|M?Pa|bar|N[.*]mm|(m|rad|deg)/s(\^2|²|2)|#|[kM]?Ohm|Ω"
+)
+_TIME_NAMES = ("time", "zeit", "date")
+_UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
 
 
 class Headings(NamedTuple):
@@ -82,7 +90,7 @@ def indexed(cells: Sequence[str]) -> set[str]:
     return {cell for cell in cells if others and _FIRST_INDEX.search(cell)}
 
 
-def labelled_headings(lines: Sequence[str], split: Split) -> Headings | None:
+def labelled_headings(lines: Sequence[str], cells_of: Split) -> Headings | None:
     """The headings of a table whose channels have times of their own, by rows of labels; None of any other table.
 
     A label stands above each column of times: `Name;ActPos;Name;CmdVolt`, or `Name;ActPos;CmdVolt;Name;Torque`.
@@ -91,7 +99,7 @@ def labelled_headings(lines: Sequence[str], split: Split) -> Headings | None:
     times: tuple[int, ...] = ()
     scope = False
     for line in lines:
-        cells = split(line)
+        cells = cells_of(line)
         label = cells[0].casefold() if cells else ""
         scope |= _SCOPE.fullmatch(label) is not None
         if label in _PAIR_NAMES and not times:
@@ -106,7 +114,7 @@ def labelled_headings(lines: Sequence[str], split: Split) -> Headings | None:
     width = len(next(iter(rows.values())))
     labels = set()
     for line in lines:
-        cells = split(line)
+        cells = cells_of(line)
         labels |= {cell.casefold() for cell in cells[:1]}
         if len(cells) >= width and len({cells[i] for i in times}) == 1:
             rows.setdefault(cells[0].casefold(), cells[:width])
@@ -168,3 +176,85 @@ def of_rigol(
         (*own, *units[rest:]),
         counted,
     )
+
+
+def headings_above(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
+    """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
+    noted = [_note(line, delimiter, width) for line in lines[:first]]
+    below_what = next((i for i in range(first) if len(split(lines[i], delimiter)) == width), first)
+    noted[: below_what + 1] = [None] * len(noted[: below_what + 1])  # the first of such rows has the names
+    above = [line for line, note in zip(lines, noted, strict=False) if line.strip() and note is None][-2:]
+    below = [split(line, delimiter) for line in lines[first : first + FEW] if line.strip() and not is_comment(line)]
+    ended = bool(below) and all(cells[-1] == "" for cells in below)  # a delimiter ends each row, and perhaps no heading
+    rows = [heading_cells(line + delimiter * ended, delimiter, width) for line in above]
+    if ended and None in rows:
+        rows = [found or heading_cells(line, delimiter, width) for found, line in zip(rows, above, strict=True)]
+    units: list[str | None] = [None] * width
+    heads = rows[-1] if rows else None
+    if heads is not None and heads[0].strip("[]():").casefold() in _UNIT_LABELS and are_units(heads[1:]):
+        heads = ["", *heads[1:]]  # a label, and no unit
+    above_units = heads is not None and len(rows) > 1 and rows[-2] is not None and _seem_units(heads, rows[-2], decimal)
+    if heads is not None and above_units:
+        units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
+        heads = rows[-2]
+    filled = {i for cells in below if len(cells) == width for i in range(width) if cells[i].lower() not in BLANKS}
+    # above blanks alone, numbers are notes
+    numbers = {i for i, cell in enumerate(heads or ()) if is_number(cell, decimal)}
+    if heads is None or (numbers & filled and not above_units):
+        return Headings(tuple(f"column {i + 1}" for i in range(width)), tuple(units))
+    names: list[str] = []
+    torn: list[str] = []
+    numbered = indexed(heads)
+    for i, cell in enumerate(heads):
+        name, unit = (cell, None) if cell in numbered else name_and_unit(cell.strip('"'))
+        if units[i] is not None and unit is not None and dimension(unit) is None:
+            name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
+        names.append(f"column {i + 1}" if i in numbers - filled or not name else name)
+        if unit and units[i] and dimension(unit) and dimension(units[i] or "") and plain(unit) != plain(units[i] or ""):
+            torn.append(f"{name} in {unit}, and {units[i]} below")
+        units[i] = unit if unit is not None else units[i]
+    for note in noted:
+        if note is not None and note[0] in _UNIT_LABELS:
+            units = [unit or own or None for unit, own in zip(units, ["", *note[1]], strict=True)]
+    return Headings(tuple(names), tuple(units), torn=tuple(torn))
+
+
+def _note(line: str, delimiter: str, width: int) -> tuple[str, list[str]] | None:
+    """What a row below the headings notes of each signal, as Simulink's data inspector does: `,Units: mm,Units: V`."""
+    label, *cells = split(line, delimiter) or [""]
+    keys = {cell.partition(":")[0].strip().casefold() for cell in cells}
+    if label or width < 2 or len(cells) != width - 1 or len(keys) != 1 or not all(":" in cell for cell in cells):
+        return None
+    return keys.pop(), [cell.partition(":")[2].strip() for cell in cells]
+
+
+def heading_cells(line: str, delimiter: str, width: int) -> list[str] | None:
+    """The cells of a row of headings, a remark perhaps; None where they are not as many as the columns."""
+    text = line.lstrip()
+    for mark in COMMENTS:
+        text = text.removeprefix(mark)
+    cells = split(text, delimiter)
+    if delimiter == " " and len(cells) != width:  # `time [s]  position [mm]`
+        cells = [cell.strip() for cell in re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", text)]
+    if delimiter == " " and len(cells) != width:  # `Time   Encoder 1 Pos   Control Effort`
+        cells = re.split(r"\s{2,}|\t", text.strip())
+    return cells if len(cells) == width else None
+
+
+def are_units(cells: Sequence[str]) -> bool:
+    """Whether all that stands in a row are units, each a known one."""
+    given = [cell.strip("[]() ") for cell in cells if cell.strip("[]()- ")]
+    return bool(given) and all(dimension(cell) is not None for cell in given)
+
+
+def _seem_units(cells: Sequence[str], names: Sequence[str], decimal: str) -> bool:
+    """Whether a row below the row `names` is one of units, of which some may be unknown: half of them are none."""
+    if are_units(cells):
+        return True
+    given = [cell for cell in cells if cell.strip("[]()- ")]
+    known = sum(dimension(cell.strip("[]() ")) is not None for cell in given)
+    other = sum(_OTHER_UNITS.fullmatch(cell.strip("[]() ")) is not None for cell in given)
+    words = all(not is_number(cell, decimal) for cell in (*cells, *names)) and all(names)
+    # a row of names below a title: `t V mm` names its columns by their units
+    words &= not any(cell.strip("[]() ") == "t" or cell.casefold().startswith(_TIME_NAMES) for cell in given)
+    return words and known > 0 and 2 * (known + other) >= len(given)

@@ -18,7 +18,6 @@ from rds.core.errors import InputError
 from rds.identification.logs.csv_cells import (
     BLANKS,
     CLOCK,
-    COMMENTS,
     DATE,
     DELIMITERS,
     are_numbers,
@@ -29,29 +28,21 @@ from rds.identification.logs.csv_cells import (
     stamped,
 )
 from rds.identification.logs.csv_headings import (
-    Headings,
+    FEW,
     alternates,
-    indexed,
+    are_units,
+    heading_cells,
+    headings_above,
     labelled_headings,
-    name_and_unit,
     of_rigol,
 )
-from rds.identification.logs.units import dimension, plain
-from rds.results.units import split_heading
 
-_FEW = 20  # rows of data that are looked at for how they end
 HEAD = 1 << 16  # bytes looked at
 _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
 _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells of commas or blanks
 _TREND = re.compile(r"\d\d:\d\d:\d\d;\d{1,6},")  # a time in a trend of Rockwell's Studio 5000
 _SCOPE_ROWS = ("SymbolComment ", "Data-Type ", "SampleTime[ms] ")  # of TwinCAT's scope, with blanks between the cells
 _FEW_NULLS = 0.2  # share of a text's bytes
-# what stands in a row of units beside those of `units.py`
-_OTHER_UNITS = re.compile(
-    r"k?W|[°]?C|Deg C|degC|k?Hz|k?g|kgf|J|[AW]h|M?Pa|bar|N[.*]mm|(m|rad|deg)/s(\^2|²|2)|#|[kM]?Ohm|Ω"
-)
-_TIME_NAMES = ("time", "zeit", "date")
-_UNIT_LABELS = ("unit", "units", "einheit", "einheiten")
 
 
 @dataclass(frozen=True)
@@ -128,7 +119,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     if found_heads is None:
         first = _with_faulty_rows(lines, first, mark, point, width)
         lines, surplus = _cut_heading(lines, first, mark, point, width)
-        found_heads = _headings(lines, first, mark, point, width)
+        found_heads = headings_above(lines, first, mark, point, width)
     names, units, times, scaled, torn = found_heads
     width = len(names)
     if mark == "," and not labelled and first > 0:
@@ -136,7 +127,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     if labelled:  # most rows may be shorter, as channels end one after another
         first = _below_labels(lines, first, mark, point, width)
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
-    if stamp := stamped(body[:_FEW], point):
+    if stamp := stamped(body[:FEW], point):
         what = f"a terminal's time stamp stands before each line ({stamp!r}), and its first column cannot be read; "
         cut = f"cut {len(stamp)} characters off: `cut -c{len(stamp) + 1}- FILE > log.csv`"
         raise InputError(f"{what}switch the stamps off there, or {cut}", str(path))
@@ -151,7 +142,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         and not any(is_number(row[i], point) for row in body)
         and any(row[i].lower() not in BLANKS for row in body)
     )
-    ends = [row[-1] for row in body[:_FEW] if row[-1].rstrip("];").lower() not in BLANKS]
+    ends = [row[-1] for row in body[:FEW] if row[-1].rstrip("];").lower() not in BLANKS]
     if mark != ";" and width - 1 in words and ends and all(is_number(cell.rstrip("];"), point) for cell in ends):
         what = (
             "its rows end in ';', as a matrix is typed in MATLAB, so that its first row and last column cannot be read"
@@ -160,7 +151,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         raise InputError(f"{what}; take the marks off: `tr -d '{marks}' < FILE > log.txt`", str(path))
     times = times or (tuple(range(0, width, 2)) if alternates(units) else ())
     announced = _announced(lines[:first])
-    numbers = [i for i in range(width) if any(is_number(row[i], point) for row in body[:_FEW])]
+    numbers = [i for i in range(width) if any(is_number(row[i], point) for row in body[:FEW])]
     passed = "" if labelled else _passed(lines[:first], mark, point, width, numbers)
     counted = None
     if found_rigol := of_rigol([line for line in whole[:first] if line.strip()], names, units):
@@ -294,10 +285,10 @@ def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal:
     at = first
     while at > 0 and not is_comment(lines[at - 1]):
         cells = split(lines[at - 1], delimiter)
-        if len(cells) != width or not any(is_number(cell, decimal) for cell in cells) or _are_units(cells):
+        if len(cells) != width or not any(is_number(cell, decimal) for cell in cells) or are_units(cells):
             break
         at -= 1
-    heading = _heading_cells(lines[at - 1], delimiter, width) if at > 0 else None
+    heading = heading_cells(lines[at - 1], delimiter, width) if at > 0 else None
     return at if heading is not None else first
 
 
@@ -355,7 +346,7 @@ def _cut_heading(
     wider = len(cells) > width
     while cells and not cells[-1]:
         cells.pop()
-    below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
+    below = [split(line, delimiter) for line in lines[first : first + FEW] if line.strip() and not is_comment(line)]
     ended = bool(below) and all(row[-1] == "" for row in below)
     own, surplus = cells[: width - ended], cells[width - ended :]
     if (
@@ -377,86 +368,6 @@ def _below_labels(lines: Sequence[str], first: int, delimiter: str, decimal: str
         if len(cells) >= width and all(is_number(cell, decimal) for cell in cells if cell.lower() not in BLANKS):
             return number
     return first
-
-
-def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
-    """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
-    noted = [_note(line, delimiter, width) for line in lines[:first]]
-    below_what = next((i for i in range(first) if len(split(lines[i], delimiter)) == width), first)
-    noted[: below_what + 1] = [None] * len(noted[: below_what + 1])  # the first of such rows has the names
-    above = [line for line, note in zip(lines, noted, strict=False) if line.strip() and note is None][-2:]
-    below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
-    ended = bool(below) and all(cells[-1] == "" for cells in below)  # a delimiter ends each row, and perhaps no heading
-    rows = [_heading_cells(line + delimiter * ended, delimiter, width) for line in above]
-    if ended and None in rows:
-        rows = [found or _heading_cells(line, delimiter, width) for found, line in zip(rows, above, strict=True)]
-    units: list[str | None] = [None] * width
-    heads = rows[-1] if rows else None
-    if heads is not None and heads[0].strip("[]():").casefold() in _UNIT_LABELS and _are_units(heads[1:]):
-        heads = ["", *heads[1:]]  # a label, and no unit
-    above_units = heads is not None and len(rows) > 1 and rows[-2] is not None and _seem_units(heads, rows[-2], decimal)
-    if heads is not None and above_units:
-        units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
-        heads = rows[-2]
-    filled = {i for cells in below if len(cells) == width for i in range(width) if cells[i].lower() not in BLANKS}
-    # above blanks alone, numbers are notes
-    numbers = {i for i, cell in enumerate(heads or ()) if is_number(cell, decimal)}
-    if heads is None or (numbers & filled and not above_units):
-        return Headings(tuple(f"column {i + 1}" for i in range(width)), tuple(units))
-    names: list[str] = []
-    torn: list[str] = []
-    numbered = indexed(heads)
-    for i, cell in enumerate(heads):
-        name, unit = (cell, None) if cell in numbered else name_and_unit(cell.strip('"'))
-        if units[i] is not None and unit is not None and dimension(unit) is None:
-            name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
-        names.append(f"column {i + 1}" if i in numbers - filled or not name else name)
-        if unit and units[i] and dimension(unit) and dimension(units[i] or "") and plain(unit) != plain(units[i] or ""):
-            torn.append(f"{name} in {unit}, and {units[i]} below")
-        units[i] = unit if unit is not None else units[i]
-    for note in noted:
-        if note is not None and note[0] in _UNIT_LABELS:
-            units = [unit or own or None for unit, own in zip(units, ["", *note[1]], strict=True)]
-    return Headings(tuple(names), tuple(units), torn=tuple(torn))
-
-
-def _note(line: str, delimiter: str, width: int) -> tuple[str, list[str]] | None:
-    """What a row below the headings notes of each signal, as Simulink's data inspector does: `,Units: mm,Units: V`."""
-    label, *cells = split(line, delimiter) or [""]
-    keys = {cell.partition(":")[0].strip().casefold() for cell in cells}
-    if label or width < 2 or len(cells) != width - 1 or len(keys) != 1 or not all(":" in cell for cell in cells):
-        return None
-    return keys.pop(), [cell.partition(":")[2].strip() for cell in cells]
-
-
-def _heading_cells(line: str, delimiter: str, width: int) -> list[str] | None:
-    text = line.lstrip()
-    for mark in COMMENTS:
-        text = text.removeprefix(mark)
-    cells = split(text, delimiter)
-    if delimiter == " " and len(cells) != width:  # `time [s]  position [mm]`
-        cells = [cell.strip() for cell in re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", text)]
-    if delimiter == " " and len(cells) != width:  # `Time   Encoder 1 Pos   Control Effort`
-        cells = re.split(r"\s{2,}|\t", text.strip())
-    return cells if len(cells) == width else None
-
-
-def _are_units(cells: Sequence[str]) -> bool:
-    given = [cell.strip("[]() ") for cell in cells if cell.strip("[]()- ")]
-    return bool(given) and all(dimension(cell) is not None for cell in given)
-
-
-def _seem_units(cells: Sequence[str], names: Sequence[str], decimal: str) -> bool:
-    """Whether a row below the row `names` is one of units, of which some may be unknown: half of them are none."""
-    if _are_units(cells):
-        return True
-    given = [cell for cell in cells if cell.strip("[]()- ")]
-    known = sum(dimension(cell.strip("[]() ")) is not None for cell in given)
-    other = sum(_OTHER_UNITS.fullmatch(cell.strip("[]() ")) is not None for cell in given)
-    words = all(not is_number(cell, decimal) for cell in (*cells, *names)) and all(names)
-    # a row of names below a title: `t V mm` names its columns by their units
-    words &= not any(cell.strip("[]() ") == "t" or cell.casefold().startswith(_TIME_NAMES) for cell in given)
-    return words and known > 0 and 2 * (known + other) >= len(given)
 
 
 def _announced(lines: Sequence[str]) -> int | None:

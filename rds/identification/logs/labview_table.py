@@ -31,7 +31,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.limits import read_limited
-from rds.identification.logs.csv_cells import BLANKS, decoded
+from rds.identification.logs.csv_cells import BLANKS, decoded, is_number
 from rds.identification.logs.csv_headings import name_and_unit
 from rds.identification.logs.csv_table import missing_samples, unique
 from rds.identification.logs.log import Finding, Gravity
@@ -60,7 +60,8 @@ class _Recording:
         if len(cells) > width:
             if not self.comments and any(cells[width:]):
                 raise InputError(f"it has {len(cells)} cells under {width} headings; repair or remove the line", place)
-            self.beyond += self.comma and any(cells[width:]) and all(map(_is_number, filter(None, cells[width:])))
+            surplus = [cell for cell in cells[width:] if cell]
+            self.beyond += self.comma and bool(surplus) and all(is_number(cell, ".") for cell in surplus)
             self.said += any(cells[width:])
         self.numbers.extend(_number(cell, place) for cell in cells[:width])
         self.numbers.extend([np.nan] * (width - len(cells)))
@@ -246,14 +247,8 @@ def _timed(columns: dict[str, Column], dimensions: set[str], path: Path) -> dict
 def _number(cell: str, place: str) -> float:
     try:
         value = np.nan if cell.lower() in BLANKS else float(cell.replace(",", "."))
+        if "_" in cell:  # which Python reads as in 1_000
+            raise ValueError
     except ValueError:
         raise InputError(f"{cell!r:.40} is no number; repair or remove the line", place) from None
     return value if isfinite(value) else np.nan
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
