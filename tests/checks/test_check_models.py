@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import random
+import time
 from dataclasses import replace
+from itertools import count
 
 import control
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 
 from rds.checks import check, check_controller, check_model, clauses
 from rds.core.errors import InputError
+from rds.core.thread_time import ThreadTime
 from rds.models import library_model
 
 TAU, K = 9.943e-3, 1.764
@@ -202,6 +205,21 @@ def test_no_false_alarm(good, state, params):
 def test_no_false_alarm_over_an_output(output):
     report = check_model({"derivatives": axis, "output": output})
     assert report.ok and not report.warnings, str(report)
+
+
+@pytest.mark.parametrize("waited", [0, 10**9], ids=["by itself", "for the processor"])
+def test_what_the_first_call_waits_for_the_processor_is_not_its_own(waited, monkeypatch):
+    looks = count(0, waited)  # ns
+    monkeypatch.setattr(ThreadTime, "waited", lambda account: next(looks))
+
+    def slow_at_first(t, x, u, params):
+        if t == 0.0:
+            time.sleep(0.005)
+        return axis(t, x, u, params)
+
+    report = check_model(slow_at_first, initial_state=[0.0, 0.0])
+    late = [warning.message for warning in report.warnings if warning.clause == clauses.TIME]
+    assert [message.startswith("the first call of derivatives()") for message in late] == [True] * (waited == 0)
 
 
 def test_a_library_model_is_taken_as_it_is():
