@@ -9,31 +9,27 @@ import hashlib
 import inspect
 import io
 import re
-import sys
 import tokenize
 import types
-import uuid
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from rds.core.adapt import is_control_system
-from rds.core.blame import STUDENT_ERRORS, student_error, student_line
+from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import ContractError, InputError
-from rds.core.folder_kept import folder_kept
 from rds.core.interrupt import Endless, limited
 from rds.core.quantities import near
+from rds.core.run_text import run_text
 from rds.core.signals import declaration_fault
 from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near_misses
 from rds.core.types import Controller, Reference, Source
 from rds.core.values import own_copy, shown
 
-__all__ = ["StudentFile", "from_function", "from_namespace", "load_error", "load_student", "student_error"]
+__all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "student_error"]
 
-STUDENT_MODULE = "rds_student_"  # how the names of modules begin that a student's file was loaded as
-_PYTHON = f"Python {sys.version_info.major}.{sys.version_info.minor}"
 _DECLARES = re.compile(rb"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")  # the encoding of a file of Python, PEP 263
 _NUMBERS = (int, float)
 _LARGEST = 10_000_000  # bytes; a file of data, not of code
@@ -112,7 +108,7 @@ def load_student(path: str | Path, validate: bool = True, limit: bool = True) ->
     text = _decode(data, file)
     source = Source(file.name, str(file), hashlib.sha256(data).hexdigest(), text)
     with limited() if limit else nullcontext():
-        variables = _run(text, file)
+        variables = run_text(text, file)
     student, period = _student(variables, source, validate), variables.get("sample_period")
     # by its type as it was before the file ran, which may have put another `float` in place of Python's
     return replace(student, sample_period=period) if period is not None and type(period) in _NUMBERS else student
@@ -334,77 +330,3 @@ def _decode(data: bytes, file: Path) -> str:
         raise InputError(
             f"its text cannot be read as the {declared!r} that it declares; save it as UTF-8", str(file)
         ) from error
-
-
-def _run(text: str, file: Path) -> dict[str, Any]:
-    """Variables of the module that `text` makes when it runs; the module's name is new each time."""
-    module = types.ModuleType(f"{STUDENT_MODULE}{file.stem}_{uuid.uuid4().hex[:12]}")
-    module.__file__ = str(file)
-    sys.modules[module.__name__] = module  # dataclasses and pickle look it up there
-    try:
-        with _siblings(file.parent), folder_kept():
-            exec(compile(text, str(file), "exec", dont_inherit=True), module.__dict__)
-    except BaseException as error:
-        del sys.modules[module.__name__]
-        if isinstance(error, KeyboardInterrupt):
-            raise
-        raise load_error(error, file) from error
-    return module.__dict__
-
-
-@contextmanager
-def _siblings(folder: Path) -> Iterator[None]:
-    """Files of `folder` can be imported, last of all; afterwards the next student's file finds none of them.
-
-    They are imported without leaving byte code in the student's folder: a stale one would hide an edit.
-    """
-    before, path, no_bytecode = set(sys.modules), list(sys.path), sys.dont_write_bytecode
-    sys.path.append(str(folder))
-    sys.dont_write_bytecode = True
-    try:
-        yield
-    finally:
-        sys.path[:] = path
-        sys.dont_write_bytecode = no_bytecode
-        sys.path_importer_cache.pop(str(folder), None)
-        for name in set(sys.modules) - before:
-            origin = getattr(sys.modules[name], "__file__", None)
-            is_part = name.partition(".")[0] in before  # of a package that the student's folder only happens to hold
-            if origin and not is_part and _is_inside(origin, folder):
-                del sys.modules[name]
-
-
-def _is_inside(origin: str, folder: Path) -> bool:
-    """Imported through `folder`; an environment that merely lies below it holds installed packages."""
-    path = Path(origin)
-    return path.is_relative_to(folder) and "site-packages" not in path.relative_to(folder).parts
-
-
-def load_error(error: BaseException, file: Path) -> InputError:
-    """What `file` raised while it was run as a module, with its place and the remedy."""
-    line = student_line(error, file)
-    where = f"{file}:{line}" if line else str(file)
-    if isinstance(error, SyntaxError) and Path(error.filename or "") == file:
-        text = (error.text or "").strip()
-        return InputError(f"syntax error: {error.msg}{f': `{text}`' if text else ''}; {_PYTHON} cannot read it", where)
-    if line is None and isinstance(error, MemoryError | RecursionError):  # the parser's: no line of it has run
-        said = "brackets, operators or `elif` lie too deep in each other; split them"
-        return InputError(f"{_PYTHON} cannot read it: {said}", where)
-    said = student_error(error, file)
-    if isinstance(error, SystemExit):
-        return InputError(f"it ends the program while it loads: {said}; remove the exit", where)
-    if isinstance(error, ModuleNotFoundError) and str(error.name).startswith("rds."):
-        remedy = "where files are graded, rds holds the interfaces only: move what runs experiments under "
-        remedy += '`if __name__ == "__main__":`'
-    elif isinstance(error, ModuleNotFoundError):
-        remedy = f"install {error.name}, or put {error.name}.py next to the file (where files are graded, "
-        remedy += "no other file is there, and only numpy, scipy and control: what is graded must be in one file)"
-    elif isinstance(error, FileNotFoundError):
-        remedy = "check its name; where files are graded, no other file is there: write what it holds into this one"
-    elif isinstance(error, NameError) and error.name in ("get_ipython", "display"):
-        remedy = "a notebook that was saved as Python has such lines: remove them, or hand in the notebook itself"
-    elif type(error) is ImportError and "relative import" in str(error):
-        remedy = "import a file next to it by its name alone, without the dot; what is graded must be in one file"
-    else:
-        remedy = 'correct it, or move what is not a definition under `if __name__ == "__main__":`'
-    return InputError(f"it fails while it loads: {said}; {remedy}", where)

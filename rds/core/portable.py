@@ -11,14 +11,14 @@ from functools import cache
 from types import CodeType
 from typing import Any
 
+from rds.core.run_text import STUDENT_MODULE
+
 _LOCK = threading.RLock()  # what is pickled may be made of what is pickled
 
 
 def portable(value: Any) -> bytes:
     """The value pickled: a student's functions travel by value, what can be imported there as well by its name."""
     import cloudpickle
-
-    from rds.core.load import STUDENT_MODULE  # numpy comes with it, which not every worker needs
 
     with _LOCK:  # cloudpickle's list of modules is the process's, and not made for threads
         students = [module for name, module in list(sys.modules.items()) if name.startswith(STUDENT_MODULE)]

@@ -18,7 +18,8 @@ import numpy.random  # here, before the forks: else each of them imports it anew
 
 from rds.core.blame import student_error
 from rds.core.errors import ContractError, InputError
-from rds.core.load import StudentFile, load_error, load_student
+from rds.core.load import StudentFile, load_student
+from rds.core.run_text import load_error
 from rds.core.signature import INTERFACES, form
 from rds.grading.sandbox.door import Closed
 from rds.grading.sandbox.frames import FrameError
