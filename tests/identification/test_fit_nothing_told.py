@@ -26,11 +26,14 @@ AXIS = structure("axis")
 
 def test_an_interval_wider_than_its_value_and_a_value_at_a_bound_are_marked() -> None:
     estimate = fit([log(square(3.0))], AXIS)
-    parameters = dict(estimate.parameters) | {"friction_plus": Parameter(0.5, 0.3, -0.1, 1.1, "mm/s")}
+    parameters = dict(estimate.parameters) | {
+        "friction_plus": Parameter(0.5, 0.3, -0.1, 1.1, "mm/s"),
+        "friction_minus": Parameter(-3e-33, 0.1, 0.0, 0.2, "mm/s"),  # what a search leaves of 0
+    }
     marked = replace(estimate, parameters=parameters, details={"at_bound": ["friction_minus"]})
     _, rows = parameter_rows(marked)
     shown = {row[0]: row[1] for row in rows}
-    assert shown["friction_plus"] == "(0.5, poorly determined)" and shown["friction_minus"].endswith("at its bound)")
+    assert shown["friction_plus"] == "(0.5, poorly determined)" and shown["friction_minus"] == "(0, at its bound)"
     assert shown["K"].startswith("1.76") and estimate.details["at_bound"] == [] and not estimate.unusable()
 
 

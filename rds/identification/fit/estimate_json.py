@@ -62,14 +62,15 @@ def parameter_rows(estimate: Estimate) -> tuple[list[str], Rows]:
 
 def _shown(p: Parameter, at_bound: bool = False) -> tuple[str, str, str]:
     """Value, standard error and interval; of what the data do not tell few digits, and that it is no estimate."""
+    few = f"{p.value if abs(p.value) > 1e-15 else 0.0:.2g}"  # a search that ends at 0 may leave 1e-32, or -0
     if not p.told:
-        return f"({p.value:.2g}, assumed)", "–", "not determined by these data"
+        return f"({few}, assumed)", "–", "not determined by these data"
     if p.std_error == 0.0:
         return f"{p.value:.6g}", "–", "held"
     if at_bound:
-        return f"({p.value:.2g}, at its bound)", "–", "not determined by these data"
+        return f"({few}, at its bound)", "–", "not determined by these data"
     if p.wide:
-        return f"({p.value:.2g}, poorly determined)", f"{p.std_error:.2g}", f"{p.low:.2g} to {p.high:.2g}"
+        return f"({few}, poorly determined)", f"{p.std_error:.2g}", f"{p.low:.2g} to {p.high:.2g}"
     return f"{p.value:.6g}", f"{p.std_error:.2g}", f"{p.low:.6g} to {p.high:.6g}"
 
 
