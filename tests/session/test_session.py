@@ -96,7 +96,7 @@ class User:
 def test_the_machine_has_one_user_on_a_page(tmp_path: Path) -> None:
     session, user = Session(tmp_path), User()
     session.take_machine("a run of X", user)
-    with pytest.raises(InputError, match="in use on this page"):
+    with pytest.raises(InputError, match="in use on this page: a run of X; stop"):
         session.take_machine("another", User())
     session.give_machine_back(User())  # of somebody who has it not: no change
     assert session.machine_user is user

@@ -24,6 +24,7 @@ class Claim:
 
     def __init__(self, folder: Path, what: str):
         """Take it; InputError that says who has it, or that the folder cannot be written to."""
+        self.what = what
         self._note = folder / ".machine.json"
         lock = folder / ".machine.lock"
         try:

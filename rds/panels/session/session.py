@@ -164,7 +164,8 @@ class Session:
         """
         with self._lock:
             if self.machine_user is not None:
-                raise InputError("the machine is in use on this page; stop that first")
+                assert self._claim is not None  # both are set and cleared together
+                raise InputError(f"the machine is in use on this page: {self._claim.what}; stop that first")
             claim = Claim(self.folder, what)
             if going := self.runs_that_go_on():  # its page was killed, or it was begun in a terminal
                 claim.release()
