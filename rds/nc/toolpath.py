@@ -102,6 +102,7 @@ class _Converter:
         self._last_line = 0
         self._ended = False
         self._feed_before = self._feed = FREE_FEED  # who had a say in it before its last change, and has now
+        self._threads = 0
         self._locked, self._locked_line = False, 0  # by DISABLE_FEED_OVERRIDE, in which line
 
     def ready(self) -> Iterator[PathBlock]:
@@ -276,7 +277,14 @@ class _Converter:
 
     def _synchronize(self, call: Call) -> None:
         self._feeds.pitch = float(call.args[0])
-        self._leave_feed_to(TIED_FEED, call.line)
+        begins = self._leave_feed_to(TIED_FEED, call.line)
+        self._threads += begins
+        if begins and self._threads == 2:
+            message = (
+                "a second cut does not meet the thread of the first: the spindle here tells its speed, and not its "
+                "angle; cut each thread at once"
+            )
+            self._warn(ProgramError(message, file=call.file or self._file, line=call.line))
 
     def _end_synchronizing(self, call: Call) -> None:
         self._feeds.pitch = 0.0
@@ -290,14 +298,16 @@ class _Converter:
         self._locked = False
         self._leave_feed_to(FREE_FEED, call.line)
 
-    def _leave_feed_to(self, whose: float, line: int) -> None:
-        """The motion rests where this changes; back and forth where nothing moves is no change."""
+    def _leave_feed_to(self, whose: float, line: int) -> bool:
+        """Whether this is a change. The motion rests there; back and forth where nothing moves is none."""
         if self._events and self._events[-1][:2] == (self._count - 1, "override"):
             self._events.pop()
             self._feed = self._feed_before
-        if whose != self._feed:
-            self._feed_before, self._feed = self._feed, whose
-            self._event("override", whose, line)
+        if whose == self._feed:
+            return False
+        self._feed_before, self._feed = self._feed, whose
+        self._event("override", whose, line)
+        return True
 
     def _rows_of(self, call: Call, ends: np.ndarray) -> None:
         """Moves by feed to places in program coordinates (one row each, X Y Z A B C)."""

@@ -270,3 +270,11 @@ def test_who_has_a_say_in_the_feed(program: str, says: list[tuple[int, int, int]
     text = f"G21 G90 F100 S300 M3\n{program}\nM2\n"
     told = [each for block in toolpath(interpret(text)) for each in block.events if each.kind == "override"]
     assert [(each.after, each.value, each.line) for each in told] == says
+
+
+@pytest.mark.parametrize(("program", "lines"), [("G33 X1 K1\nG33 X3 Z-1 K1", []), ("G33 X1 K1\nG0 X0\nG33 X1 K1", [4])])
+def test_a_thread_in_several_cuts_is_warned_of(program: str, lines: list[int]) -> None:
+    """The spindle's angle is not known: the cuts would lie beside each other."""
+    told: list[ProgramError] = []
+    list(toolpath(interpret(f"G21 G90 S300 M3\n{program}\nM2\n"), warn=told.append))
+    assert [fault.line for fault in told] == lines
