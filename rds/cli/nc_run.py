@@ -107,6 +107,10 @@ def run(
     channel: Annotated[
         str | None, typer.Option(help="With --method: a serial port, or a served machine (default: one for this run).")
     ] = None,
+    begin: Annotated[
+        int, typer.Option(metavar="LINE", help="Run it from this line on; all before but tool and spindle is left out.")
+    ] = 0,
+    steps: Annotated[bool, typer.Option("--steps", help="Wait after each line that moves.")] = False,
     optional_stop: Annotated[bool, typer.Option("--optional-stop/--no-optional-stop", help="Whether M1 stops.")] = True,
     out: Annotated[
         Path | None,
@@ -142,6 +146,8 @@ def run(
                 "--look-ahead": look_ahead,
                 "--profile": profile != "planned",
                 "--cut": cut,
+                "--begin": begin,
+                "--steps": steps,
                 "--no-optional-stop": not optional_stop,
                 "--exchange": exchange,
                 "--yes": yes,
@@ -181,6 +187,8 @@ def run(
                 acceleration=acceleration_of(acceleration, acceleration_time, None, exact_stop),
                 exact_stop=exact_stop,
                 profile=profile,
+                begin=begin,
+                steps=steps,
                 cut=cut,
                 experiment=experiment,
                 mode=mode,

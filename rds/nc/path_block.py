@@ -13,7 +13,8 @@ class Event(NamedTuple):
 
     Kinds and values: "dwell" s; "spindle" rev/min, + clockwise (0: it stops); "stop" 0 (M0, M60) or 1 (M1, optional);
     "tool" its number; "coolant" "flood on", "flood off", "mist on" or "mist off"; "output" as "digital 0 1" (kind,
-    number, value); "end" 0 (M2, M30, or the last line).
+    number, value); "override" FREE_FEED, LOCKED_FEED (M49) or TIED_FEED (threads, taps); "end" 0 (M2, M30, or the
+    last line).
     """
 
     after: int

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.shared_quantities import FREE_FEED, LOCKED_FEED, TIED_FEED
 from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT
 from rds.nc.feed_rates import FeedRates
 from rds.nc.language.canon import ARC, FEED, MOTION, SPEED, Call, MotionBlock
@@ -100,6 +101,9 @@ class _Converter:
         self._done: list[PathBlock] = []
         self._last_line = 0
         self._ended = False
+        self._feed_before = self._feed = FREE_FEED  # who had a say in it before its last change, and has now
+        self._threads = 0
+        self._locked, self._locked_line = False, 0  # by DISABLE_FEED_OVERRIDE, in which line
 
     def ready(self) -> Iterator[PathBlock]:
         if self._waiting >= BLOCK_SEGMENTS:
@@ -116,7 +120,6 @@ class _Converter:
     def end(self) -> None:
         """A program without M2 or M30 ends with its last line."""
         self._convert()
-        self._passed_over.end()
         if self._unused is not None and not self._started:
             self._warn(self._unused)
         if not self._ended:
@@ -176,6 +179,9 @@ class _Converter:
             return
         rows = np.concatenate(self._rows) if len(self._rows) > 1 else self._rows[0]
         self._rows, self._waiting = [], 0
+        if self._locked and not self._feeds.pitch:  # what moves in the very line of a lock is a tap
+            taps = bool(np.all(rows["line"] == self._locked_line))
+            self._leave_feed_to(TIED_FEED if taps else LOCKED_FEED, self._locked_line)
         speeds = np.flatnonzero(rows["kind"] == SPEED)
         given = rows[speeds]
         if len(speeds):
@@ -271,9 +277,37 @@ class _Converter:
 
     def _synchronize(self, call: Call) -> None:
         self._feeds.pitch = float(call.args[0])
+        begins = self._leave_feed_to(TIED_FEED, call.line)
+        self._threads += begins
+        if begins and self._threads == 2:
+            message = (
+                "a second cut does not meet the thread of the first: the spindle here tells its speed, and not its "
+                "angle; cut each thread at once"
+            )
+            self._warn(ProgramError(message, file=call.file or self._file, line=call.line))
 
     def _end_synchronizing(self, call: Call) -> None:
         self._feeds.pitch = 0.0
+        self._leave_feed_to(LOCKED_FEED if self._locked else FREE_FEED, call.line)
+
+    def _lock_feed(self, call: Call) -> None:
+        self._locked, self._locked_line = True, call.line
+        self._leave_feed_to(LOCKED_FEED, call.line)
+
+    def _free_feed(self, call: Call) -> None:
+        self._locked = False
+        self._leave_feed_to(FREE_FEED, call.line)
+
+    def _leave_feed_to(self, whose: float, line: int) -> bool:
+        """Whether this is a change. The motion rests there; back and forth where nothing moves is none."""
+        if self._events and self._events[-1][:2] == (self._count - 1, "override"):
+            self._events.pop()
+            self._feed = self._feed_before
+        if whose == self._feed:
+            return False
+        self._feed_before, self._feed = self._feed, whose
+        self._event("override", whose, line)
+        return True
 
     def _rows_of(self, call: Call, ends: np.ndarray) -> None:
         """Moves by feed to places in program coordinates (one row each, X Y Z A B C)."""
@@ -366,6 +400,8 @@ _ACTIONS: dict[str, Callable[[_Converter, Call], Any]] = {
     "SET_FEED_MODE": _Converter._feed_mode,
     "START_SPEED_FEED_SYNC": _Converter._synchronize,
     "STOP_SPEED_FEED_SYNCH": _Converter._end_synchronizing,
+    "DISABLE_FEED_OVERRIDE": _Converter._lock_feed,
+    "ENABLE_FEED_OVERRIDE": _Converter._free_feed,
     "NURBS_FEED": _Converter._spline,
     "STRAIGHT_PROBE": _Converter._probe,
     "CHANGE_TOOL_NUMBER": _Converter._rename_tool,

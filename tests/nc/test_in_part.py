@@ -6,8 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from rds import open_result
+from rds.cli.main import app
 from rds.core.errors import InputError
+from rds.modes.loop.execution import State
 from rds.modes.loop.program import STEP
 from rds.nc.run.run import PartProgram
 
@@ -32,6 +36,16 @@ def test_a_run_from_a_line_goes_up_across_and_down_and_cuts_the_rest(file: Path)
     assert [(each.kind, each.value) for each in part.prepared.program.happenings[:1]] == [("spindle", 1000.0)]
     result = part.run()
     assert set(result["program_line"]) == {2.0, 8.0, 9.0} and result["X_measured"][-1] == pytest.approx(0.0, abs=0.1)
+
+
+def test_the_command_takes_both_and_what_holds_before_holds(file: Path, tmp_path: Path) -> None:
+    file.write_text(PROGRAM.replace("M3 S1000", "M3 S1000 M49"))
+    command = ["nc", "run", str(file), "--begin", "7", "--steps", "--override", "50", "--out", str(tmp_path / "out")]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    result = open_result(tmp_path / "out")
+    assert set(result["program_line"]) == {2.0, 8.0, 9.0}
+    assert State.STOP in result["program_state"]
+    assert set(result["program_override"][result["program_line"] == 8.0]) == {0.0, 1.0}  # M49: no override
 
 
 def test_a_line_after_the_last_move_and_an_interpolator_are_refused(file: Path) -> None:

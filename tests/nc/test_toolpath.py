@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, LINE, XY, YZ, ZX, point_at
 from rds.nc.language.canon import ARC, FEED, MOTION, RATE, SPEED, TRAVERSE, Call, MotionBlock
 from rds.nc.language.errors import ProgramError
+from rds.nc.language.interpreter import interpret
 from rds.nc.path_block import PathBlock
 from rds.nc.toolpath import toolpath
 
@@ -249,20 +250,31 @@ def test_how_the_stream_is_cut_into_blocks_changes_nothing(
 
 
 @pytest.mark.parametrize(
-    ("calls", "lines"),
+    ("program", "says"),
     [
-        ((("DISABLE", 4), ("ENABLE", 4)), []),  # a cycle's or a thread's own
-        ((("DISABLE", 2),), [2]),
-        ((("DISABLE", 2), ("ENABLE", 5)), [2]),
-        ((("DISABLE", 2), ("DISABLE", 4), ("ENABLE", 4)), [2]),
-        ((("DISABLE", 4), ("ENABLE", 4), ("DISABLE", 6), ("ENABLE", 8), ("DISABLE", 9)), [6]),  # told once
+        ("M48\nG1 X1", []),
+        ("G1 X1\nM49\nG1 X2\nM48\nG1 X3", [(0, 1, 3), (1, 0, 5)]),
+        ("M50 P0\nM50 P1\nG1 X1", []),
+        ("M49 G1 X1\nX2", [(-1, 1, 2), (1, 0, 4)]),  # with others behind it, a move in the line of M49 is none of a tap
+        ("G33 X1 K1\nG33 X3 Z-1 K1\nG1 X4", [(-1, 2, 2), (1, 0, 3)]),  # threads go on into each other
+        ("G84 X1 Z-2 R1\nX2\nG80", [(1, 2, 2), (3, 0, 2), (4, 2, 3), (6, 0, 3)]),
+        ("M49\nG84 X1 Z-2 R1\nG80\nG1 X3", [(-1, 1, 2), (1, 2, 3), (3, 1, 3), (4, 0, 6)]),
+        (
+            "G18 G0 X5\nG76 P1 Z-9 I-1 J1 K2",
+            [(2, 2, 3), (4, 0, 3), (6, 2, 3), (8, 0, 3)],
+        ),  # the way out of the thread, too
     ],
 )
-@pytest.mark.parametrize("of", ["FEED", "SPEED"])
-def test_an_override_that_the_program_locks_is_told_at_its_line(
-    of: str, calls: tuple[tuple[str, int], ...], lines: list[int]
-) -> None:
+def test_who_has_a_say_in_the_feed(program: str, says: list[tuple[int, int, int]]) -> None:
+    """After which segment it becomes the operator's (0), the program's alone (1), the spindle's (2), by which line."""
+    text = f"G21 G90 F100 S300 M3\n{program}\nM2\n"
+    told = [each for block in toolpath(interpret(text)) for each in block.events if each.kind == "override"]
+    assert [(each.after, each.value, each.line) for each in told] == says
+
+
+@pytest.mark.parametrize(("program", "lines"), [("G33 X1 K1\nG33 X3 Z-1 K1", []), ("G33 X1 K1\nG0 X0\nG33 X1 K1", [4])])
+def test_a_thread_in_several_cuts_is_warned_of(program: str, lines: list[int]) -> None:
+    """The spindle's angle is not known: the cuts would lie beside each other."""
     told: list[ProgramError] = []
-    list(toolpath([Call(f"{does}_{of}_OVERRIDE", line=line) for does, line in calls], warn=told.append))
+    list(toolpath(interpret(f"G21 G90 S300 M3\n{program}\nM2\n"), warn=told.append))
     assert [fault.line for fault in told] == lines
-    assert all("M49, M50 P0 and M51 P0 lock no override" in str(fault) for fault in told)

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.core.shared_quantities import FREE_FEED, LOCKED_FEED, TIED_FEED
 from rds.core.types import Ending
 from rds.interpolators.motion.segments import BLEND, SEGMENT, arc, chain, line
 from rds.machines import load_machine
@@ -275,6 +276,35 @@ def test_a_spindle_that_never_gets_there_is_told() -> None:
     assert ran.ending is Ending.STOPPED
     assert "the spindle turns at -1000 rev/min 10 s after line 5 asked for -2000" in ran.reason
     assert (ran.position == 0.0).all()
+
+
+def test_a_thread_is_cut_at_the_feed_of_its_spindle() -> None:
+    """An override or a rest in it would spoil its pitch; M49 leaves the feed to the program, but not the hold."""
+    events = (
+        Event(0, "override", TIED_FEED, 2),
+        Event(1, "override", LOCKED_FEED, 3),
+        Event(2, "override", FREE_FEED, 4),
+    )
+    program = prepared(PATH, *events)
+    begins = next(each.sample for each in program.program.happenings if each.kind == "override")
+    for changes in ([(0.0, "override", 0.5)], [(0.0, "override", 2.0)], [(begins * T + 0.3, "hold", 1)]):
+        ran = execute(program, changes)
+        moves = ran.state == State.RUNS
+        inner = [moves & (ran.line == k) & (ran.place != np.roll(ran.place, 1)) for k in (1, 2, 3, 4)]
+        assert (ran.rate[inner[1]][:-1] == 1.0).all()
+        if changes[0][1] == "override":
+            assert (ran.rate[inner[2]][:-1] == 1.0).all()
+            assert (ran.rate[inner[0]][:-1] != 1.0).any()
+            assert (ran.rate[inner[3]][:-1] != 1.0).any()
+        else:
+            assert ran.position[-1].tolist() == [6.0, 4.0, 0.0]  # where the thread ends
+            assert "held in line" in ran.reason
+    home = execute(program, [(begins * T + 0.3, "home", 1)])
+    assert home.position[home.state != State.HOME][-1].tolist() == [6.0, 4.0, 0.0]
+    last = prepared(PATH, Event(0, "override", TIED_FEED, 2), Event(3, "override", FREE_FEED, 4))
+    assert execute(last, [(begins * T + 0.3, "home", 1)]).reason == "went home from line 4"
+    stop = execute(program, [(begins * T + 0.3, "stop", 1)])
+    assert stop.reason == "stopped in line 2"
 
 
 def test_discarded_samples_are_not_lost_time() -> None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Protocol
 
+from rds.core.shared_quantities import FREE_FEED, TIED_FEED
 from rds.core.types import Ending
 from rds.modes.loop.changes import STOP
 from rds.modes.loop.force_guard import MOST, Cell
@@ -115,6 +116,7 @@ class Execution:
         guard = program.guard if isinstance(program, Program) else None
         self._guard = None if guard is None else guard.start(T, cell)
         self._allowed = MOST  # rate, by the guard
+        self._feed = FREE_FEED  # whose it is
         for reference, value in zip(references, self._position, strict=False):
             reference.position.value = value
 
@@ -181,7 +183,17 @@ class Execution:
 
     def _wanted(self) -> float:
         values = self._values
-        return 0.0 if values[HOLD] or values[STOP] or values[HOME] else min(values[OVERRIDE], self._allowed)
+        if values[STOP]:
+            return 0.0
+        if self._feed == TIED_FEED:
+            return 1.0
+        if values[HOLD] or values[HOME]:
+            return 0.0
+        return min(values[OVERRIDE] if self._feed == FREE_FEED else 1.0, self._allowed)
+
+    def _leaves(self) -> bool:
+        """Whether the axes are to go home from where they rest."""
+        return bool(self._values[HOME]) and self._feed != TIED_FEED
 
     def _along_the_path(self, positions: Sequence[float]) -> None:
         follower, until, wanted = self._follower, self._until(), self._wanted()
@@ -194,7 +206,7 @@ class Execution:
         is_still = is_there or follower.rate == 0.0
         if is_still and self._values[STOP]:
             self._end(Ending.STOPPED, f"stopped in line {self._line}")
-        elif is_still and self._values[HOME]:
+        elif is_still and self._leaves():
             self._go_home()
         elif not is_there and follower.rate == 0.0 and wanted == 0.0:
             self._held()
@@ -241,6 +253,11 @@ class Execution:
             self._await_spindle()
         elif kind == "tool" or (kind == "stop" and self._stops(value)):
             self._await_somebody(State.TOOL if kind == "tool" else State.STOP)
+        elif kind == "override":
+            self._feed = value
+            self._follower.settle(self._wanted())
+            if self._leaves():
+                self._go_home()
         elif kind == "end":
             self._next = len(self._follower.happenings)
             self._end(Ending.DONE, "")
@@ -265,7 +282,7 @@ class Execution:
         if self._values[STOP]:
             self._end(Ending.STOPPED, f"stopped in line {self._line}")
             return True
-        if self._values[HOME]:
+        if self._leaves():
             self._go_home()
             return True
         return False

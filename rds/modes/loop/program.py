@@ -26,7 +26,7 @@ class ProgramEvent(NamedTuple):
     """What happens at a planned sample, by a line of the program.
 
     Kinds and values: "dwell" s; "spindle" rev/min, + clockwise (0: it stops); "stop" 0 (M0), 1 (M1, optional)
-    or STEP (after a line, in single step); "tool" its number; "end".
+    or STEP (after a line, in single step); "tool" its number; "override" FREE_FEED, LOCKED_FEED or TIED_FEED; "end".
     """
 
     sample: int

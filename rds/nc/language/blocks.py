@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rds.nc.language.expressions import Fault, whole
-from rds.nc.language.outside import EXTRUDER, FANUC_CONTOUR, no_such_g, no_such_m
+from rds.nc.language.outside import EXTRUDER, FANUC_CONTOUR, LOOK_AHEAD, REPEATS, no_such_g, no_such_m
 from rds.nc.language.state import NO_MOTION, XY, State
 
 AXES = "xyzabc"
@@ -161,7 +161,8 @@ def settle_motion(block: Block, state: State) -> None:
                 f"g{motion}",
             )
         elif not axes and motion not in _WITHOUT_AXES:
-            raise Fault(f"G{motion / 10:g} without an axis word; write where it goes", f"g{motion}")
+            spline = f"; without one it {LOOK_AHEAD}" if motion in (50, 51) else ""
+            raise Fault(f"G{motion / 10:g} without an axis word; write where it goes{spline}", f"g{motion}")
         block.motion = motion
     elif covets:
         _check_shift(non_modal, words)
@@ -286,6 +287,8 @@ def check(block: Block, state: State) -> None:
             raise Fault(f"P {FANUC_CONTOUR}", letter)
         if not used and letter == "e" and motion in (0, 10, 20, 30):
             raise Fault(EXTRUDER, letter)
+        if not used and letter == "k" and cycle and motion != 740:
+            raise Fault(REPEATS, letter)
         if not used:
             raise Fault(f"nothing on the line uses {letter.upper()}; it goes with {by}", letter)
     if "@" in words or "^" in words:

@@ -30,12 +30,15 @@ _G = {
     690: "G69 ends G68 of other controls; write G10 L2 P0 R0",
     750: "G75 cuts grooves on other controls; write its cuts as G0 and G1",
     770: "G77 is a turning cycle of other controls; write its cuts as G0 and G1",
+    1030: "G103 limits the look-ahead of Haas' controls; leave it out, motion is always planned ahead here",
+    1870: "G187 sets the smoothness of Haas' controls; write G64 P and how far corners may be off the path",
     780: "G78 is a threading cycle of other controls; write G76 or G33",
 }
 _M = {
     10: "M10 clamps an axis on other controls; leave it out",
     11: "M11 releases an axis on other controls; leave it out",
     17: "M17 ends a subroutine of Siemens' controls; write M99, or O<name> ENDSUB",
+    29: "M29 announces rigid tapping on Fanuc's controls; leave it out, and write S and M3 before G84",
     97: "M97 calls part of a program on other controls; write O<name> CALL",
     82: "M82 counts the filament of 3-D printers absolutely; let a CAM program write the part for a mill",
     83: "M83 counts the filament of 3-D printers from move to move; let a CAM program write the part for a mill",
@@ -105,6 +108,8 @@ _LANGUAGES = tuple(
 )
 OLD_LINE_ENDS = "its lines end with CR alone, so that they are one; save the file with line ends LF, or CR LF"
 
+LOOK_AHEAD = "switches look-ahead on Fanuc's controls; leave it out, motion is always planned ahead here"
+REPEATS = "K says on Fanuc's controls how often a cycle is repeated; write L"
 EXTRUDER = (
     "E on a move is the filament of a 3-D printer, which no machine here has; let a CAM program write the part for a"
     " mill"

@@ -14,16 +14,16 @@ from rds.interpolators.motion.segments import AXES, EXACT_STOP, JOINTS, line
 from rds.modes.loop.program import STEP, Program, ProgramEvent
 from rds.nc.path_block import Event, PathBlock
 
-_KEPT = ("tool", "spindle", "coolant")  # events of what was left out that hold at the line where it begins
+_KEPT = ("tool", "spindle", "coolant", "override")  # events of what was left out that hold at the line where it begins
 _FASTEST = 1e3  # mm/s; a rapid move has the axes' own speeds
 
 
 def from_line(blocks: Iterable[PathBlock], begin: int, file: Path) -> Iterator[PathBlock]:
     """The motion from the first move on that line `begin`, or a later one, of `file` makes.
 
-    All before it is left out but the tool, the spindle and the coolant that hold there. The axes go from 0 to where
-    that move begins: up to the highest point so far, across, and down, at the move's feed where it cuts. InputError
-    where no move comes there, or it moves the tool's tip (G43.4).
+    All before it is left out but the tool, the spindle, the coolant and the lock of the override that hold there. The
+    axes go from 0 to where that move begins: up to the highest point so far, across, and down, at the move's feed where
+    it cuts. InputError where no move comes there, or it moves the tool's tip (G43.4).
     """
     top, last, latest = 0.0, 0, dict[str, Event]()
     given = iter(blocks)

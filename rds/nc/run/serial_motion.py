@@ -123,7 +123,7 @@ def serial_motion(
         elif each.kind == "spindle":
             speeds.append((each.sample, 0 if after is None else sum(counts[: after + 1]), each.value))
     notes = [*prepared.notes, *_off_their_circles(prepared.path)]
-    if kinds := sorted({each.kind for each in happenings} - {"end", "dwell", "spindle"}):
+    if kinds := sorted({each.kind for each in happenings} - {"end", "dwell", "spindle", "override"}):
         notes.append(f"nodes move axes and spindle only; not carried out of the program: {', '.join(kinds)}")
     if motion == "plan":
         assert isinstance(program, Program)
