@@ -30,9 +30,9 @@ _G = {
     690: "G69 ends G68 of other controls; write G10 L2 P0 R0",
     750: "G75 cuts grooves on other controls; write its cuts as G0 and G1",
     770: "G77 is a turning cycle of other controls; write its cuts as G0 and G1",
+    780: "G78 is a threading cycle of other controls; write G76 or G33",
     1030: "G103 limits the look-ahead of Haas' controls; leave it out, motion is always planned ahead here",
     1870: "G187 sets the smoothness of Haas' controls; write G64 P and how far corners may be off the path",
-    780: "G78 is a threading cycle of other controls; write G76 or G33",
 }
 _M = {
     10: "M10 clamps an axis on other controls; leave it out",
