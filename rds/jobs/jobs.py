@@ -16,7 +16,7 @@ from rds.nc.run.run import PartProgram
 MOST = 100  # jobs that are kept
 _SAFE_END = 20.0  # s for a run that is stopped
 NO_END = (
-    f"stopped, but its code did not end within {_SAFE_END:g} s; look for a call that waits, such as input() or sleep(). "
+    f"stopped, but its code did not end within {_SAFE_END:g} s; look for a call that waits, such as input(). "
     "It is left behind until the server ends"
 )
 
