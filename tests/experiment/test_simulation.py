@@ -138,6 +138,11 @@ def test_results_are_saved_only_where_asked(alone: Path) -> None:
     assert list(alone.iterdir()) == []
     result = rds.Experiment(**GOOD).run(out=alone / "a" / "b")
     assert (rds.open_result(alone / "a" / "b")["X_measured"] == result["X_measured"]).all()
+    result = rds.Experiment(**GOOD).run(out=alone / "kp-1.5")  # the run was made, and then its folder refused
+    assert len(rds.open_result(alone / "kp-1.5")["time"]) == len(result["time"])
+    assert result.save(alone / "kp-2.0mm").is_dir() and result.save(alone / "kp-1.5") == alone / "kp-1.5"
+    with pytest.raises(rds.InputError, match="unknown suffix '.xlsx'"):
+        result.save(alone / "result.xlsx")
     (alone / "file").write_text("")
     with pytest.raises(rds.InputError, match="file"):
         rds.Experiment(**GOOD).run(out=alone / "file")
