@@ -156,10 +156,10 @@ class Result:
     def save(self, path: str | Path) -> Path:
         """Save to a .csv, .mat or .parquet file, or in all three kinds in a directory; InputError if it cannot.
 
-        A directory has no suffix, or one that begins with a digit, as in `kp-1.5`; or it is there already.
+        A directory's name has no suffix, or one that begins with a digit, as in `kp-1.5`.
         """
         path = Path(path)
-        if path.suffix and not path.suffix[1:2].isdigit() and not path.is_dir():
+        if path.suffix and not path.suffix[1:2].isdigit():
             return save_result(self, path)
         save_all(self, path)
         return path

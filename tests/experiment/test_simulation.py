@@ -141,7 +141,7 @@ def test_results_are_saved_only_where_asked(alone: Path) -> None:
     result = rds.Experiment(**GOOD).run(out=alone / "kp-1.5")  # the run was made, and then its folder refused
     assert len(rds.open_result(alone / "kp-1.5")["time"]) == len(result["time"])
     assert result.save(alone / "kp-2.0mm").is_dir() and result.save(alone / "kp-1.5") == alone / "kp-1.5"
-    with pytest.raises(rds.InputError, match="unknown suffix '.xlsx'"):
+    with pytest.raises(rds.InputError, match=r"unknown suffix '\.xlsx'"):
         result.save(alone / "result.xlsx")
     (alone / "file").write_text("")
     with pytest.raises(rds.InputError, match="file"):
@@ -193,8 +193,8 @@ def test_a_file_that_changes_the_folder_changes_nobody_else_s(alone: Path) -> No
 
 
 def test_a_run_s_tables_are_written_once(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rds.modes.experiment import experiment as results
     from rds.modes.experiment.report import run_and_save
-    from rds.results import result as results
 
     written, save = [], results.save_all
     monkeypatch.setattr(results, "save_all", lambda result, folder: written.append(folder) or save(result, folder))
