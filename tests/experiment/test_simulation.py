@@ -193,11 +193,14 @@ def test_a_file_that_changes_the_folder_changes_nobody_else_s(alone: Path) -> No
 
 
 def test_a_run_s_tables_are_written_once(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rds.modes.experiment import experiment as results
     from rds.modes.experiment.report import run_and_save
+    from rds.results import save_all
 
-    written, save = [], results.save_all
-    monkeypatch.setattr(results, "save_all", lambda result, folder: written.append(folder) or save(result, folder))
+    written: list[Any] = []
+    monkeypatch.setattr(
+        "rds.modes.experiment.experiment.save_all",
+        lambda result, folder: written.append(folder) or save_all(result, folder),
+    )
     (alone / "e.toml").write_text(
         "axis = 'X'\nduration = 0.1\nmode = 'simulation'\n[reference]\nkind = 'sinusoid'\n"
         "amplitude = 1.0\nfrequency = 5.0\n[controller]\nname = 'p'\n"
