@@ -68,7 +68,7 @@ class Job:
         told["taken"], told["samples"] = run.progress
         if self.error is not None:
             told["error"] = self.error
-        elif self.state == OVER:
+        elif told["state"] == OVER:
             meta = run.wait().meta
             told |= {"ending": str(meta.get("ending", Ending.DONE)), "verdict": run.wait().verdict}
             if meta.get("ending_reason"):

@@ -9,12 +9,16 @@ from rds.core.blame import is_students, student_error
 from rds.core.errors import InputError, RdsError
 from rds.jobs.folder import Folder
 from rds.jobs.job import LOADED, OVER, QUEUED, RUNNING, STARTING, Job
-from rds.modes import DEFAULT
+from rds.modes import DEFAULT, load_mode
 from rds.modes.experiment.experiment import Experiment
 from rds.nc.run.run import PartProgram
 
 MOST = 100  # jobs that are kept
 _SAFE_END = 20.0  # s for a run that is stopped
+NO_END = (
+    f"stopped, but its code did not end within {_SAFE_END:g} s; look for a call that waits, such as input(). "
+    "It is left behind until the server ends"
+)
 
 
 class Jobs:
@@ -104,6 +108,10 @@ class Jobs:
                 job.state = LOADED
                 return job
         job.active().stop()
+        if not load_mode(job.mode).real_time:  # a target ends what hangs in it; nothing ends a thread that sleeps
+            patience = threading.Timer(_SAFE_END, self._over, (job, NO_END))
+            patience.daemon = True
+            patience.start()
         return job
 
     def drop(self, number: int) -> None:
@@ -149,8 +157,16 @@ class Jobs:
             job.state = RUNNING
             run.wait()
         except BaseException as error:
-            job.error = sentence(error)
+            self._over(job, sentence(error))
+        else:
+            self._over(job, None)
+
+    def _over(self, job: Job, error: str | None) -> None:
+        """The job is over, unless it was before; then the next one of the queue."""
         with self._lock:
+            if self._current is not job:
+                return
+            job.error = error  # first: the end of a run without an error is waited for
             job.state, self._current = OVER, None
             while self._queue and self._current is None and not self._closed:
                 self._begin(self._queue.pop(0))

@@ -9,10 +9,10 @@ from __future__ import annotations
 import asyncio
 import hmac
 import json
+import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from typing import Any
+from typing import Any, TypeVar
 
 from rds.core.errors import InputError
 from rds.core.installed import version
@@ -22,6 +22,7 @@ from rds.jobs.job import OVER
 from rds.jobs.jobs import Jobs, sentence
 from rds.jobs.requests import answer, parse, words_of
 
+T = TypeVar("T")
 LONGEST_LINE = 65_536  # bytes
 CLIENTS = 16  # that have said the secret, and as many that have not
 WATCHES = 8  # of one client at a time
@@ -41,7 +42,6 @@ class Server:
         """Until SIGINT, SIGTERM or the end of its terminal (SIGHUP, but under nohup); then what runs is stopped."""
         stop = asyncio.Event()
         loop = asyncio.get_running_loop()
-        self.use_threads(loop)
         for number in ending_signals():
             with suppress(NotImplementedError):  # Windows: Ctrl-C ends asyncio.run
                 loop.add_signal_handler(number, stop.set)
@@ -50,13 +50,9 @@ class Server:
             ready()
             await stop.wait()
             server.close()
-            await asyncio.to_thread(self._jobs.close)
+            await _beside(self._jobs.close)
             for writer in [*self._clients, *self._strangers]:
                 writer.close()
-
-    def use_threads(self, loop: asyncio.AbstractEventLoop) -> None:
-        """One for each that may ask, and for the end: no stop waits until the files of others are read."""
-        loop.set_default_executor(ThreadPoolExecutor(CLIENTS * (1 + WATCHES) + 1, "request"))
 
     async def _meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._strangers) >= CLIENTS:
@@ -71,8 +67,8 @@ class Server:
                     return
                 self._clients.add(writer)
                 await self._converse(reader, writer, watches)
-        except (OSError, TimeoutError, asyncio.IncompleteReadError):  # it has left, or does not read
-            pass
+        except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.CancelledError):
+            pass  # it has left, or does not read; or the server ends
         finally:
             self._strangers.pop(writer, None)
             self._clients.discard(writer)
@@ -128,7 +124,7 @@ class Server:
                 return {"id": mark, "ok": True, "rds": version()}, None  # the same client for both kinds of servers
             verb, values = words_of(request)
             if verb != "watch":
-                answered = await asyncio.to_thread(answer, self._jobs, verb, values)
+                answered = await _beside(lambda: answer(self._jobs, verb, values))
                 return {"id": mark, "ok": True, **answered}, None
             if watches >= WATCHES:
                 raise InputError(f"{WATCHES} watches are at work on this connection; open another one")
@@ -141,11 +137,41 @@ async def _watch(writer: asyncio.StreamWriter, mark: Any, job: Any, period: floa
     """Status lines until the job is over, that of its end the last."""
     with suppress(OSError, TimeoutError):
         while True:
-            told = await asyncio.to_thread(job.status)
+            told = await _beside(job.status)
             await _say(writer, {"id": mark, "ok": True, "event": "status", **told})
             if told["state"] == OVER:
                 return
             await asyncio.sleep(period)
+
+
+async def _beside(work: Callable[[], T]) -> T:
+    """`work()` in a thread of its own, so that nobody waits for a file of somebody else that does not end.
+
+    The server's end does not wait for such threads either, as it would for those of asyncio.
+    """
+    loop, found = asyncio.get_running_loop(), asyncio.Future[T]()
+
+    def told(value: T | None, error: BaseException | None) -> None:
+        if found.done():
+            return  # who asked has left
+        if error is None:
+            found.set_result(value)  # type: ignore[arg-type]
+        else:
+            found.set_exception(error)
+
+    def go() -> None:
+        value, error = None, None
+        try:
+            value = work()
+        except Exception as raised:
+            error = raised
+        except BaseException as raised:  # a file's own KeyboardInterrupt, which would end the server
+            error = InputError(sentence(raised))
+        with suppress(RuntimeError):  # the server has ended
+            loop.call_soon_threadsafe(told, value, error)
+
+    threading.Thread(target=go, name="request", daemon=True).start()
+    return await found
 
 
 async def _line(reader: asyncio.StreamReader) -> bytes | None:

@@ -154,9 +154,12 @@ class Result:
         return compare(self, other)
 
     def save(self, path: str | Path) -> Path:
-        """Save to a .csv, .mat or .parquet file, or in all three kinds in a directory; InputError if it cannot."""
+        """Save to a .csv, .mat or .parquet file, or in all three kinds in a directory; InputError if it cannot.
+
+        A directory's name has no suffix, or one that begins with a digit, as in `kp-1.5`.
+        """
         path = Path(path)
-        if path.suffix:
+        if path.suffix and not path.suffix[1:2].isdigit():
             return save_result(self, path)
         save_all(self, path)
         return path

@@ -19,6 +19,7 @@ from rds.bus.modules.calling import find_machine
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.drivers import AxisDrivers
 from rds.bus.modules.rds.frames import Answer, Kind, Status
+from rds.bus.modules.rds.identity import refuse_others
 from rds.bus.modules.rds.module import AxisModule
 from rds.bus.modules.rds.server import serve
 from rds.core.errors import InputError, MachineError
@@ -95,6 +96,29 @@ def test_positions_count_from_the_start_and_the_spindle_does_not(served: dict[st
     drivers.start()
     assert drivers.exchange() == [0.0, 0.0], "start() waits until the axes stand"
     drivers.close()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"resolution": 0.0009921875}, {"unit": "deg"}],
+)
+def test_a_module_of_another_machine_is_refused(served: dict[str, Any], change: dict[str, Any]) -> None:
+    """The mill's modules moved for the mini CNC: its positions were told 0.8 % too large, without a word."""
+    other = replace(SLOW, axes={**SLOW.axes, "X": replace(SLOW.axis("X"), **change)})
+    drivers = AxisDrivers(other, ["X"], **served)
+    with pytest.raises(MachineError, match=r"X \(node 2\): the module .* is another machine's, or of another axis"):
+        drivers.start()
+    drivers.close()
+
+
+def test_firmware_of_another_version_is_refused() -> None:
+    axis = SLOW.axis("X")
+    module = AxisModule(axis, 0, SLOW.sample_period, 0.0)
+    refuse_others([module.identity, module.identity._replace(scale=0)], [axis], 10.0)
+    with pytest.raises(MachineError, match="speaks version 2 of these frames, and this host version 1"):
+        refuse_others([module.identity._replace(version=2)], [axis], 10.0)
+    with pytest.raises(MachineError, match="at ±5 V"):
+        refuse_others([module.identity], [axis], 5.0)
 
 
 def test_write_returns_what_acts_from_this_tick_on(served: dict[str, Any]) -> None:

@@ -46,9 +46,9 @@ def test_a_command_carries_its_number_beside_its_voltages(voltages: list[float],
     assert frames.number_voltages(numbered, 0) == plain
 
 
-@given(st.integers(1, 95), st.integers(0, frames.SERIALS - 1), st.integers(0, 2**32 - 1))
-def test_identities_come_back_and_differ_in_their_identifiers(node: int, serial: int, process: int) -> None:
-    identity = frames.Identity(node, serial, process)
+@given(st.integers(1, 95), st.integers(0, frames.SERIALS - 1), st.integers(0, 2**32 - 1), st.integers(0, 65535))
+def test_identities_come_back_and_differ_in_their_identifiers(node: int, serial: int, process: int, scale: int) -> None:
+    identity = frames.Identity(node, serial, process, scale=scale)
     assert frames.decode_identity(*frames.encode_identity(identity)) == identity
     assert frames.encode_identity(identity)[0] != frames.encode_identity(identity._replace(serial=serial ^ 1))[0]
 

@@ -291,10 +291,11 @@ def test_events_and_comments_are_no_damage(tmp_path: Path) -> None:
     path.write_text(
         ASC_HEAD + "// comment\n0.0 Start of measurement\n0.1 1  Statistic: D 1 R 0 XD 0 XR 0 E 0 O 0 B 0.1%\n"
         "0.2 CAN 1 Status:chip status error active\n0.3 1 123 Rx d 1 11\n\nEnd TriggerBlock\n"
+        "2.200804 0 16777215 0 1 GMGroup: Marker Group GMMarker: [1] GMDescription: of Vector's own converter\n"
     )
     log = LogFile(path)
     assert len(list(log)) == 1
-    assert log.skipped == 2
+    assert log.skipped == 3
 
 
 def test_a_cut_or_damaged_blf_is_refused_with_its_offset(tmp_path: Path) -> None:

@@ -81,6 +81,28 @@ def test_home_gets_the_position_that_the_table_gives_it(machine: Machine, served
         assert host.exchange() == [-12.5]
 
 
+def test_a_drive_whose_home_offset_has_the_other_sign_is_told_and_can_be_homed(
+    machine: Machine, served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of some makers 0x607C is the position at home: the axis was 25 mm from where the host believed it to be."""
+    download = configure._download
+    monkeypatch.setattr(
+        configure,
+        "_download",
+        lambda node, index, sub, value: download(node, index, sub, -value if index == 0x607C else value),
+    )
+    channel, nodes = served("X")
+    axis: dict[str, Any] = {"homing": 37, "home": -12.5}
+    with drivers(machine, channel, ["X"], cia402={"positions": "drive", "axis": {"X": axis}}) as host:
+        with pytest.raises(MachineError, match=r"take `home` out, and give write = \[\[0x607C, 0, -12500\]\]"):
+            host.start()
+        assert no_voltage(nodes)
+    axis = {"homing": 37, "write": [[0x607C, 0, -12500]]}
+    with drivers(machine, channel, ["X"], cia402={"positions": "drive", "axis": {"X": axis}}) as host:
+        host.start()
+        assert host.exchange() == [-12.5]
+
+
 def test_whoever_watches_a_homing_sees_it_move_and_can_end_it(machine: Machine, served: Served) -> None:
     class Enough(Exception):
         pass

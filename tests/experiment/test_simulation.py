@@ -138,6 +138,11 @@ def test_results_are_saved_only_where_asked(alone: Path) -> None:
     assert list(alone.iterdir()) == []
     result = rds.Experiment(**GOOD).run(out=alone / "a" / "b")
     assert (rds.open_result(alone / "a" / "b")["X_measured"] == result["X_measured"]).all()
+    result = rds.Experiment(**GOOD).run(out=alone / "kp-1.5")  # the run was made, and then its folder refused
+    assert len(rds.open_result(alone / "kp-1.5")["time"]) == len(result["time"])
+    assert result.save(alone / "kp-2.0mm").is_dir() and result.save(alone / "kp-1.5") == alone / "kp-1.5"
+    with pytest.raises(rds.InputError, match=r"unknown suffix '\.xlsx'"):
+        result.save(alone / "result.xlsx")
     (alone / "file").write_text("")
     with pytest.raises(rds.InputError, match="file"):
         rds.Experiment(**GOOD).run(out=alone / "file")
@@ -189,10 +194,13 @@ def test_a_file_that_changes_the_folder_changes_nobody_else_s(alone: Path) -> No
 
 def test_a_run_s_tables_are_written_once(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from rds.modes.experiment.report import run_and_save
-    from rds.results import result as results
+    from rds.results import save_all
 
-    written, save = [], results.save_all
-    monkeypatch.setattr(results, "save_all", lambda result, folder: written.append(folder) or save(result, folder))
+    written: list[Any] = []
+    monkeypatch.setattr(
+        "rds.modes.experiment.experiment.save_all",
+        lambda result, folder: written.append(folder) or save_all(result, folder),
+    )
     (alone / "e.toml").write_text(
         "axis = 'X'\nduration = 0.1\nmode = 'simulation'\n[reference]\nkind = 'sinusoid'\n"
         "amplitude = 1.0\nfrequency = 5.0\n[controller]\nname = 'p'\n"

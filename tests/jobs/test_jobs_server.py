@@ -157,8 +157,11 @@ def test_a_server_that_is_too_busy_to_answer_keeps_its_socket(tmp_path: Path) ->
     address.listen().close()  # that one has gone, and left it behind
 
 
-def test_no_stop_waits_until_the_files_of_others_are_read(tmp_path: Path) -> None:
-    """With as many files to read as Python has threads for such work, a stop waited for the first of them."""
+def test_no_stop_and_no_end_waits_until_the_files_of_others_are_read(tmp_path: Path) -> None:
+    """With as many files to read as Python has threads for such work, a stop waited for the first of them.
+
+    The end of the server waited for all of them, without end where a file calls input() while it loads.
+    """
     read = threading.Event()
     jobs: Any = SimpleNamespace(load=lambda *_, **__: read.wait(10.0), stop=lambda _: SimpleNamespace(state="running"))
     address = Address.of(tmp_path / "jobs.sock")
@@ -166,7 +169,6 @@ def test_no_stop_waits_until_the_files_of_others_are_read(tmp_path: Path) -> Non
     async def stopped() -> bytes:
         server = JobsServer(jobs, address, None)
         async with await asyncio.start_unix_server(server._meet, sock=address.listen()):
-            server.use_threads(asyncio.get_running_loop())
             lines = [await asyncio.open_unix_connection(address.path) for _ in range(CLIENTS)]
             for _, writer in lines[1:]:
                 writer.write(b'{"do": "check", "file": "a"}\n')
@@ -176,11 +178,49 @@ def test_no_stop_waits_until_the_files_of_others_are_read(tmp_path: Path) -> Non
             try:
                 return await asyncio.wait_for(reader.readline(), 5.0)
             finally:
-                read.set()
                 for _, writer in lines:
                     writer.close()
 
-    assert b'"state": "running"' in asyncio.run(stopped())
+    began = time.monotonic()
+    try:
+        assert b'"state": "running"' in asyncio.run(stopped())
+        assert time.monotonic() - began < 5.0
+    finally:
+        read.set()
+
+
+def test_a_simulation_that_waits_is_left_behind_once_it_is_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Such a job was stopped, and ran; and so did every other one wait, until the server was killed."""
+    monkeypatch.setattr("rds.jobs.jobs._SAFE_END", 0.1)
+    jobs = Jobs(Folder(tmp_path))
+    law = "import time\ndef control(t, r, y, state, params):\n    {}\n    return 0.0, state\n"
+    wait = f"if t > 0: open({str(tmp_path / 'begun')!r}, 'w').close(); time.sleep(3.0)"
+    loaded = []
+    for name, line in (("waits", wait), ("other", "pass")):
+        (tmp_path / f"{name}.py").write_text(law.format(line))
+        (tmp_path / f"{name}.toml").write_text(EXPERIMENT.format(controller=f'file = "{name}.py"'))
+        loaded.append(jobs.load(f"{name}.toml", None, None, None, keep=True))
+    waits, other = loaded
+    jobs.run(waits.number, queue=False)
+    jobs.run(other.number, queue=True)
+    wait_for((tmp_path / "begun").exists, 20.0)
+    jobs.stop(waits.number)
+    wait_for(lambda: other.state == "over", 20.0)
+    assert "did not end within" in waits.status()["error"] and other.status()["ending"] == "done"
+
+
+def test_a_file_that_raises_keyboard_interrupt_does_not_end_the_server(serve: Serve) -> None:
+    server = serve()
+    (server.folder / "law.py").write_text("raise KeyboardInterrupt\n")
+    (server.folder / "law.toml").write_text(EXPERIMENT.format(controller='file = "law.py"'))
+    client = server.client()
+    assert "KeyboardInterrupt" in client.ask(do="load", file="law.toml")["error"]
+    assert client.ask(do="jobs")["ok"]
+    server.process.terminate()
+    assert server.process.wait(60.0) == 0 and server.process.stderr is not None
+    assert server.process.stderr.read() == ""  # of clients that were connected there was a traceback
 
 
 def test_texts_in_an_experiment_may_be_longer_than_names_of_files(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,16 @@ def test_two_modules_with_one_number_are_refused_by_name(serve: Serve, bus: can.
         scan(bus)
     drivers = OacsDrivers(MACHINE, ["X"], channel=channel)
     with pytest.raises(MachineError, match="number 4 is used 2 times"):
+        drivers.start()
+    drivers.close()
+
+
+def test_a_module_that_counts_otherwise_is_refused(serve: Serve, channel: str) -> None:
+    """The module of another machine moved for this one, its positions wrong by what its encoder is finer."""
+    serve("X")
+    finer = replace(MACHINE.axis("X"), resolution=1.0 / 170.0)
+    drivers = OacsDrivers(replace(MACHINE, axes={**MACHINE.axes, "X": finer}), ["X"], channel=channel)
+    with pytest.raises(MachineError, match=r"X: module 4 \(LinrXa, .*\) has 169 counts per mm, where .* 170 per mm"):
         drivers.start()
     drivers.close()
 

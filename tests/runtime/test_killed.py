@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,6 +35,7 @@ from rds.core.contracts import Counters
 from rds.modes.loop.changes import stop_channel
 from rds.modes.loop.live_values import LiveValues
 from rds.modes.process import recorder, target
+from rds.modes.process.machine import machine_behind
 from rds.modes.process.recorder import CLOSING, READY, Recorder, conclude, watch
 from rds.modes.process.ring import Ring
 from rds.results import Result
@@ -275,6 +277,20 @@ def test_who_only_looks_keeps_nobody_from_the_command(alone: Path) -> None:
     given_back.start()
     with Command("own"):
         given_back.join()
+
+
+@pytest.mark.parametrize(("mode", "told"), [("implementation", 1), ("emulation", 0)])
+def test_who_gets_a_machine_of_its_own_beside_a_served_one_is_told(
+    experiment: Maker, alone: Path, monkeypatch: pytest.MonkeyPatch, mode: str, told: int
+) -> None:
+    """The run moved a simulated machine that nobody saw, without a word, while another one moved the served one."""
+    monkeypatch.setattr("rds.bus.hub.address.channels", lambda: ["mini-cnc"])
+    monkeypatch.setattr("rds.bus.modules.server_process.start_server", lambda *_: None)
+    monkeypatch.setattr("rds.bus.modules.server_process.end_server", lambda _: None)
+    plan = experiment().plan(mode)
+    with warnings.catch_warnings(record=True) as said, Command("mini-cnc"), machine_behind(plan) as settled:
+        assert settled.bus["channel"].startswith("mini-cnc-")
+    assert len(said) == told and all("a simulated machine of its own" in str(each.message) for each in said)
 
 
 def test_a_machine_that_is_killed_before_it_is_there(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,6 +26,7 @@ _ASC_FRAME = re.compile(r"\d+\.\d+\s+(CANFD\s+)?\d+(\s+(Rx|Tx))?(\s+[0-9A-F]+x?(
 _ASC_HEADING = re.compile(
     r"(date|base|begin|end|previous log file)\b.*|(no\s*)?internal\s+events\s+logged.*|[/;*].*", re.IGNORECASE
 )
+_ASC_MARKER = re.compile(r"\d+\.\d+\s.*\bGMGroup:.*")  # CANoe's global markers begin with numbers, as frames do
 _EVENT = re.compile(r"\d")  # something at some time, or with some number
 _ASC_TIME_ONLY = re.compile(r"\d+(\.\d*)?")
 _TRC_FRAME = {"DT", "FD", "FB", "FE", "BI", "RR", "RX", "TX"}
@@ -148,6 +149,8 @@ def _anything(line: str, number: int) -> str | None:
 
 
 def _asc_frame(line: str) -> bool | None:
+    if _ASC_MARKER.fullmatch(line):
+        return False
     if _ASC_FRAME.fullmatch(line) or _ASC_TIME_ONLY.fullmatch(line):
         return True
     return None if _ASC_HEADING.fullmatch(line) or "Start of measurement" in line else False

@@ -29,7 +29,7 @@ from rds.modes.loop.plan import Plan
 from rds.modes.process.host import FailedSimulation, Rows, run_plan
 from rds.modes.process.live import Live
 from rds.modes.process.record import write_whole
-from rds.results import Result
+from rds.results import Result, save_all
 
 
 class FailedRun(ContractError):
@@ -278,7 +278,7 @@ class Experiment:
         if load_mode(plan.mode).validates:
             result = validated(plan, result)
         if out is not None:
-            result.save(out)
+            save_all(result, out)
             if rows.changes:
                 write_whole(Path(out) / CHANGES, as_text(rows.changes).encode())
             else:

@@ -11,6 +11,7 @@ from math import ceil
 from typing import Any
 
 from rds.core.errors import InputError, MachineError
+from rds.modes import load_mode
 from rds.modes.loop.plan import Plan
 
 BUILTIN = "rds"
@@ -58,6 +59,8 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
         return
     check_load(plan, bus, bus.get("bitrate"))
     if given is None:
+        if channel in channels() and commanded(channel):
+            _warn_of_own(plan, channel)
         channel = f"{plan.machine.channel[:20]}-{secrets.token_hex(4)}"
     remove_left()
     timing = {key: bus[key] for key in TIMING if key in bus}
@@ -66,6 +69,16 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
         yield replace(plan, bus=bus | {"channel": channel})
     finally:
         end_server(server)
+
+
+def _warn_of_own(plan: Plan, channel: str) -> None:
+    """Where a machine is to move: it is not the one that is served, which somebody may stand beside and look at."""
+    if load_mode(plan.mode).moves_machine:
+        warnings.warn(
+            f"another run commands the machine on channel {channel!r}: this run has a simulated machine of its own, "
+            f"which nobody sees; to be refused instead, give channel = {channel!r} in [bus]",
+            stacklevel=2,
+        )
 
 
 def check_load(plan: Plan, bus: Mapping[str, Any], bitrate: Any) -> None:
@@ -125,6 +138,7 @@ def _line_behind(plan: Plan, bus: dict[str, Any]) -> Iterator[dict[str, Any]]:
         if given is not None:
             raise
         served = False  # another host has it
+        _warn_of_own(plan, channel)
     if served:
         if own:
             raise InputError(

@@ -165,6 +165,7 @@ def home(node: canopen.RemoteNode, drive: DriveSettings, timeout: float, watch: 
             _wait_for_state(node, drive, state)
         _download(node, 0x6040, 0, codes.ENABLE_OPERATION | codes.BIT_4)
         _wait_for_home(node, drive, time.monotonic() + timeout, watch)
+        _check_home(node, drive)
     except BaseException:  # be it an interrupt from the keyboard: no power, and what was wrong is said
         with contextlib.suppress(MachineError, SdoCommunicationError, can.CanError, OSError):
             _take_power(node)
@@ -218,6 +219,17 @@ def _wait_for_home(node: canopen.RemoteNode, drive: DriveSettings, deadline: flo
             )
         watch(drive.axis.name, _position(node) * drive.direction / drive.counts)
         time.sleep(0.01)
+
+
+def _check_home(node: canopen.RemoteNode, drive: DriveSettings) -> None:
+    """MachineError for a drive that takes 0x607C as the position that home gets: CiA 402 says minus that."""
+    offset = drive.home_offset or 0
+    if abs((stands := _position(node)) - offset) < abs(stands + offset):
+        raise MachineError(
+            f"{drive.name}: it stands at {stands} counts after homing, where `home` asks for {-offset}: this drive's "
+            "home offset 0x607C is the position that home gets, which CiA 402 counts the other way round; take `home` "
+            f"out, and give write = [[0x607C, 0, {-offset}]]"
+        )
 
 
 # --- steps

@@ -22,7 +22,7 @@ from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.answer_order import AnswerOrder, Place
 from rds.bus.modules.rds.frames import Answer, Kind, Status
 from rds.bus.modules.rds.identity import WAIT as LISTENING
-from rds.bus.modules.rds.identity import listen, refuse_clashes
+from rds.bus.modules.rds.identity import listen, refuse_clashes, refuse_others
 from rds.bus.tools.link import BUILTIN, standard_filters
 from rds.core import contracts
 from rds.core.contracts import Watch
@@ -150,6 +150,7 @@ class AxisDrivers(CanDrivers[_Module]):
         if self._owns_bus:
             self._bus.set_filters(standard_filters(self._listens_to))
         refuse_clashes(heard.modules)
+        refuse_others(heard.modules, [module.axis for module in self._modules], self._range)
         if heard.commands:
             raise self._company(f"{heard.commands} commands in {LISTENING:g} s")
 

@@ -17,8 +17,9 @@ All frames are little-endian, and standard (11-bit) but for the last:
 | 0x01F      | module | 8     | float32 force in N that the load cell of the cutting head measured at a tick, uint16 |
 |            |        |       | count of ticks heard, uint16 reserved; at every tenth tick                           |
 | 0x020+node | module | 8     | int32 position counts, uint8 status, uint8 kind, uint16 count of ticks heard         |
-| 0x1C000000 | module | 8     | identity; + serial number (24 bits): uint8 node, uint8 version, 2 reserved,          |
-|            |        |       | uint32 process (0: firmware); extended, so that two modules of one node never collide |
+| 0x1C000000 | module | 8     | identity; + serial number (24 bits): uint8 node, uint8 version, uint16 scale (0: it  |
+|            |        |       | does not say), uint32 process (0: firmware); extended, so that two modules of one     |
+|            |        |       | node never collide                                                                   |
 | 0x1D000000 | module | 8     | clock; + node; uint64 ns of the module's own clock; extended                          |
 
 A command's int16 are voltages in 20/65536 V with their two lowest bits clear, in axis order (or in that of the axes'
@@ -34,6 +35,7 @@ number. A tick whose 0x00F was lost leaves their voltage as it was until its tim
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 from enum import IntEnum, IntFlag
 from math import isfinite
@@ -88,6 +90,7 @@ _VOLTAGES = Struct(f"<{SLOTS}h")
 _NUMBER_BITS = 0x0003_0003_0003_0003
 _SETUP = Struct("<II")
 _IDENTITY = Struct("<BBHI")
+_SCALE = Struct("<dd")
 _ANSWER = Struct("<iBBH")
 _FORCE = Struct("<fHH")
 
@@ -120,6 +123,7 @@ class Identity(NamedTuple):
     serial: int  # its own, 24 bits; of a virtual module, new with each start
     process: int = 0  # its process, if it is a virtual one
     version: int = VERSION
+    scale: int = 0  # `scale` of its axis; 0: it does not say
 
     def __str__(self) -> str:
         where = f" in process {self.process}" if self.process else ""
@@ -225,7 +229,7 @@ def decode_answer(identifier: int, data: bytes | bytearray) -> Answer:
 
 def encode_identity(identity: Identity) -> tuple[int, bytes]:
     """Identifier (extended) and data of the answer to the call WHO."""
-    data = _IDENTITY.pack(identity.node, identity.version, 0, identity.process & 0xFFFFFFFF)
+    data = _IDENTITY.pack(identity.node, identity.version, identity.scale, identity.process & 0xFFFFFFFF)
     return IDENTITY + identity.serial % SERIALS, data
 
 
@@ -233,8 +237,16 @@ def decode_identity(identifier: int, data: bytes | bytearray) -> Identity | None
     """Which module says it with this extended frame; None if it is another frame."""
     if not IDENTITY <= identifier < IDENTITY + SERIALS or len(data) != _IDENTITY.size:
         return None
-    node, version, _, process = _IDENTITY.unpack(data)
-    return Identity(node, identifier - IDENTITY, process, version)
+    node, version, scale, process = _IDENTITY.unpack(data)
+    return Identity(node, identifier - IDENTITY, process, version, scale)
+
+
+def scale(unit: str, resolution: float, range: float) -> int:
+    """What a module's counts and volts mean, in 16 bits: of the CRC-32 of two float64 and the unit the lower ones.
+
+    Unit of the axis, its units per count, and the converter's range in V. Never 0.
+    """
+    return zlib.crc32(_SCALE.pack(resolution, range) + unit.encode()) & 0xFFFF or 1
 
 
 def encode_clock(node: int, seconds: float) -> tuple[int, bytes]:

@@ -16,6 +16,7 @@ from rds.bus.modules.rds.frames import Identity
 from rds.bus.tools.link import bus_failed
 from rds.bus.tools.listening import frames_within
 from rds.core.errors import MachineError
+from rds.machines.machine import Axis
 
 WAIT = 0.1  # s for all answers
 _COMMANDS = (frames.COMMAND, frames.DRY_COMMAND)
@@ -61,6 +62,26 @@ def refuse_clashes(found: Iterable[Identity]) -> None:
     for node, names in by_node.items():
         if len(names) > 1:
             raise MachineError(clash(f"node {node}", names))
+
+
+def refuse_others(found: Iterable[Identity], axes: Iterable[Axis], range: float) -> None:
+    """MachineError for a module of `axes` whose firmware or axis is another one: its counts mean something else."""
+    by_node = {axis.node: axis for axis in axes}
+    for identity in found:
+        axis = by_node.get(identity.node)
+        if axis is None:
+            continue
+        if identity.version != frames.VERSION:
+            raise MachineError(
+                f"{axis.name} (node {axis.node}): the {identity} speaks version {identity.version} of these frames, "
+                f"and this host version {frames.VERSION}; update the older one"
+            )
+        if identity.scale and identity.scale != frames.scale(axis.unit, axis.resolution, range):
+            raise MachineError(
+                f"{axis.name} (node {axis.node}): the {identity} is another machine's, or of another axis: it does not "
+                f"count {axis.resolution:g} {axis.unit} at ±{range:g} V, as the machine's file says; connect, serve or "
+                "program the right one"
+            )
 
 
 def clash(where: str, names: Iterable[str]) -> str:

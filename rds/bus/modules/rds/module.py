@@ -59,7 +59,8 @@ class AxisModule:
         self.name = axis.name
         self.node = axis.node
         self.identifier = frames.answer_identifier(axis.node)
-        self.identity = Identity(axis.node, secrets.randbelow(frames.SERIALS), os.getpid())
+        scale = frames.scale(axis.unit, axis.resolution, range)
+        self.identity = Identity(axis.node, secrets.randbelow(frames.SERIALS), os.getpid(), scale=scale)
         turns = axis.unit == SPINDLE_UNIT
         self.motion = MachineAxis(machine_parameters(axis), start, turns)
         self.drift = float(axis.module.get("drift", 0.0)) * 1e-6 if drift is None else drift
