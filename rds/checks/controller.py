@@ -21,7 +21,7 @@ from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.timing import Work, judge_time
 from rds.checks.values import same, size
 from rds.core.adapt import as_controller, is_control_system
-from rds.core.blame import STUDENT_ERRORS, student_error
+from rds.core.blame import STUDENT_ERRORS, is_tuple_for_number, student_error
 from rds.core.load import wants_state
 from rds.core.signals import declaration_fault
 from rds.core.signature import argument_fault
@@ -182,7 +182,8 @@ class _Run:
 
     def _failed(self, error: BaseException, t: float, before: tuple[Any, ...]) -> None:
         said = student_error(error, self.source)
-        if not self.axes and not self.calls and _is_about_form(error) and self._works_with_arrays():
+        may_be_for_several = _is_about_form(error) and not is_tuple_for_number(error)
+        if not self.axes and not self.calls and may_be_for_several and self._works_with_arrays():
             return self.found.fault(clauses.RUNS, f"control() fails with one axis's numbers: {said}; {_SEVERAL}")
         if not self.calls:
             if self._is_for_want_of_state(error, before):

@@ -15,6 +15,7 @@ STUDENT_ERRORS = (Exception, SystemExit)
 """What a student's code may raise and its caller answers for; Ctrl-C is the user's."""
 
 _ARRAYS_AS_NUMBERS = ("only 0-dimensional arrays can be converted", "inhomogeneous shape")  # numpy's words
+_FROM_THE_CLOCK = re.compile(r"(?:/|//|%)\s*\(?\s*t\b")  # divided by what the time t stands in
 _OF_REFERENCE = re.compile(r"'float' object has no attribute '(?:position|velocity|acceleration)'")
 _LONGEST = 300  # characters of an exception's own text; some print whole arrays
 
@@ -40,7 +41,10 @@ def student_error(exc: BaseException, path_or_source: str | Path | Source | None
     line = (frame.line or linecache.getline(frame.filename, frame.lineno or 0)).strip()
     name = "a notebook cell" if "ipykernel" in frame.filename else Path(frame.filename).name
     where = f"{name}, line {frame.lineno}, in {frame.name}"
-    return _sentence(where, type(exc).__name__, _text(exc), line)
+    text = _text(exc)
+    if isinstance(exc, ZeroDivisionError) and _FROM_THE_CLOCK.search(line):
+        text += " (in the first call t is 0; divide by the sample period, a number of your own)"
+    return _sentence(where, type(exc).__name__, text, line)
 
 
 def is_students(exc: BaseException) -> bool:
@@ -77,6 +81,11 @@ def is_installed(filename: str) -> bool:
     return any(Path(filename).is_relative_to(root) for root in roots)
 
 
+def is_tuple_for_number(exc: BaseException) -> bool:
+    """Whether a number was multiplied with a list or tuple, such as 30,0 with a decimal comma."""
+    return isinstance(exc, TypeError) and "can't multiply sequence by non-int of type 'float'" in str(exc)
+
+
 def _text(exc: BaseException) -> str:
     try:
         text = " ".join(str(exc).split())
@@ -91,6 +100,14 @@ def _text(exc: BaseException) -> str:
         return f"{text} (r has it; y is the position itself)"
     if isinstance(exc, TypeError | ValueError) and any(said in text for said in _ARRAYS_AS_NUMBERS):
         return f"{text} (of an array of one number, such as a model's u, [0] is the number)"
+    if isinstance(exc, IndexError) and "index out of range" in text:
+        return f"{text} (the first value is [0]; of `state`, initial_state says how many there are)"
+    if isinstance(exc, UnboundLocalError):
+        return f"{text} (a function forgets its variables after each call: what is to last goes through `state`)"
+    if type(exc) is TypeError and "'float' object is not subscriptable" in text:
+        return f"{text} (it is one number, as r.position and y are with one axis: leave the [...] out)"
+    if type(exc) is TypeError and is_tuple_for_number(exc):
+        return f"{text} (a list or tuple stands where a number belongs; 30,0 is a tuple, 30.0 a number)"
     return f"{text} (the dict has no such key)" if type(exc) is KeyError else text  # its own text is the key alone
 
 

@@ -298,13 +298,18 @@ def test_an_error_without_a_line_or_a_message_still_says_what_it_is():
     [
         ("30.0 * (r.position - y) ^ 2", r"for \^: .* \(a power is written \*\*\)"),
         ("r.postion - y", r"attribute 'postion' \(r.position, r.velocity and r.acceleration are its numbers\)"),
+        ("state[1]", r"index out of range \(the first value is \[0\]; of `state`, initial_state says how many"),
+        ("y[0]", r"not subscriptable \(it is one number, as r.position and y are"),
+        ("(30,0) * (r.position - y)", r"float' \(a list or tuple stands where a number belongs; 30,0 is a tuple"),
+        ("y / (t - 0.0)", r"division by zero \(in the first call t is 0; divide by the sample period"),
+        ("(n := n + 1)", r"variable 'n' .* \(a function forgets its variables after each call"),
         ("r.position - y.position", r"attribute 'position' \(r has it; y is the position itself\)"),
     ],
 )
 def test_a_slip_in_a_formula_is_told_with_its_remedy(tmp_path: Path, answer: str, said: str) -> None:
     file = tmp_path / "law.py"
     file.write_text(f"def control(t, r, y, state, params):\n    return {answer}, state\n")
-    with pytest.raises((AttributeError, TypeError)) as broken:
+    with pytest.raises((AttributeError, TypeError, LookupError, ArithmeticError, NameError)) as broken:
         load_student(file).functions["control"](0.0, Reference(1.0, 0.0, 0.0), 0.5, (), {})
     assert re.search(said, student_error(broken.value, file))
 
