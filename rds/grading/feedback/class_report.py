@@ -200,7 +200,8 @@ def _everybody(grades: Sequence[Grade], links: Mapping[str, str]) -> Iterator[st
     head = "".join(
         f'<th scope="col"{kind}>{escape(one_line(each))}</th>' for each, kind in zip(heads, kinds, strict=True)
     )
-    yield f'<section class="everybody"><h2>Everybody</h2><div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>'
+    yield '<section class="everybody"><h2>Everybody</h2><div class="scroll"><table>'
+    yield f"<thead><tr>{head}</tr></thead><tbody>"
     names = [criterion.name for criterion in criteria]
     for grade in grades:
         yield _student(grade, names, links)

@@ -151,12 +151,11 @@ def _total(grade: Grade) -> str:
     lost = grade.before_penalty - grade.score
     if grade.late_days > 0.0 and not is_excused:
         said = f"Handed in {grade.late_days:.3g} days after the due time: "
-        said += (
-            f"{lost:.4g} of the {grade.before_penalty:.4g} points earned are lost, {100 * lost / grade.before_penalty:.3g} %; each day that has "
-            "begun counts."
-            if lost > 0.0
-            else "nothing is lost."
-        )
+        if lost > 0.0:
+            said += f"{lost:.4g} of the {grade.before_penalty:.4g} points earned are lost, "
+            said += f"{100 * lost / grade.before_penalty:.3g} %; each day that has begun counts."
+        else:
+            said += "nothing is lost."
         parts.append(f'<p class="note">{said}</p>')
     if grade.status is not Status.OK:
         parts.append(
