@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import linecache
 import re
-import sysconfig
 from pathlib import Path
 from traceback import FrameSummary, extract_tb
 
 from rds.core.errors import RdsError
+from rds.core.frames import is_installed, place_of
 from rds.core.types import Source
 
 STUDENT_ERRORS = (Exception, SystemExit)
@@ -39,8 +39,7 @@ def student_error(exc: BaseException, path_or_source: str | Path | Source | None
         return str(exc) if isinstance(exc, RdsError) else f"{type(exc).__name__}: {_text(exc)}"
     frame = own[-1]
     line = (frame.line or linecache.getline(frame.filename, frame.lineno or 0)).strip()
-    name = "a notebook cell" if "ipykernel" in frame.filename else Path(frame.filename).name
-    where = f"{name}, line {frame.lineno}, in {frame.name}"
+    where = place_of(frame)
     text = _text(exc)
     if isinstance(exc, ZeroDivisionError) and _FROM_THE_CLOCK.search(line):
         text += " (in the first call t is 0; divide by the sample period, a number of your own)"
@@ -72,13 +71,6 @@ def _is_own(filename: str, path: str | Path | None) -> bool:
     if path is not None:
         return Path(filename).parent == Path(path).resolve().parent and not is_installed(filename)
     return not filename.startswith("<frozen") and not is_installed(filename)
-
-
-def is_installed(filename: str) -> bool:
-    """True for a file of this package, of the standard library or of an installed package."""
-    parts = sysconfig.get_paths()
-    roots = {parts["stdlib"], parts["purelib"], parts["platlib"], str(Path(__file__).resolve().parents[1])}
-    return any(Path(filename).is_relative_to(root) for root in roots)
 
 
 def is_tuple_for_number(exc: BaseException) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rds.checks import check_controller
-from rds.core.errors import ContractError, InputError
+from rds.core.errors import ContractError, InputError, Notice
 from rds.core.load import from_function, from_namespace, load_student, student_error
 from rds.core.types import Reference
 
@@ -179,7 +179,9 @@ def test_an_unknown_parameter_lists_the_known_ones(write):
 
 def test_a_missing_initial_state_is_noticed_before_the_run(write):
     text = "def control(t, r, y, state, params):\n    return state[0], state\n"
-    with pytest.raises(ContractError, match=r"no initial_state.*line 2, in control.*define initial_state"):
+    with pytest.raises(
+        ContractError, match=r"no initial_state.*line 2, in control.*define it, as in `initial_state = "
+    ):
         load_student(write(text)).controller()
     assert load_student(write("initial_state = [0.0]\n" + text)).controller().initial_state == [0.0]
     lazy = "initial_state = None\n" + text.replace("state[0], state", "0.0 if state is None else state[0], [y]")
@@ -331,3 +333,26 @@ def test_a_file_of_a_python_control_system_alone_is_told_where_that_goes(write):
     named = write("import control\nderivatives = control.ss([[0, 1], [0, -9]], [[0], [1]], [[1, 0]], 0)\n")
     with pytest.raises(InputError, match=r"write `def derivatives\(t, x, u, params\)`; in it return A @ x \+ B @ u$"):
         load_student(named)
+
+
+def test_a_notebook_shows_the_users_lines_and_the_message_of_an_error() -> None:
+    """IPython's own traceback of a slip in a cell had 75 lines of this package before the message."""
+    with pytest.raises(ContractError) as broken:
+        from_function(lambda r, y: 0.0, role="control")
+    shown = broken.value._render_traceback_()
+    assert len(shown) == 2 and shown[0].startswith("test_load.py, line ") and 'role="control"' in shown[0]
+    assert "ContractError" in shown[1] and shown[1].endswith(str(broken.value))
+
+
+def test_a_function_of_a_notebook_is_told_how_its_params_go_with_it() -> None:
+    """Those of the cell are not looked at, so "define them" sent round in a circle who had."""
+    with pytest.raises(ContractError, match=r'hand params over .*`\{"control": control, "params": \{.Kp.: 1.0\}\}`'):
+        from_function(lambda t, r, y, state, params: (params["Kp"], state), role="control").controller()
+
+
+def test_a_function_of_a_notebook_that_keeps_a_global_is_told() -> None:
+    """Two runs of one experiment differed without a word."""
+    cell: dict[str, object] = {}
+    exec("i = 0\ndef control(t, r, y, state, params):\n    global i\n    i += 1\n    return i, state\n", cell)
+    with pytest.warns(Notice, match="keeps `i` outside of its state.*return it in next_state"):
+        from_function(cell["control"]).controller()  # type: ignore[arg-type]

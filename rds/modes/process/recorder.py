@@ -25,7 +25,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rds.core.blame import is_installed
+from rds.core.frames import is_installed
 from rds.core.garbage import leave
 from rds.core.private_files import keep_process_private, open_private, write_private
 from rds.core.types import Ending
