@@ -11,9 +11,8 @@ from pathlib import Path
 
 from rds.core.errors import InputError
 from rds.grading.feedback.plain_text import one_line
-from rds.grading.grade import Grade
+from rds.grading.grade import LISTED, Grade
 from rds.grading.intake.names import compared
-from rds.grading.review.everyone import LISTED
 from rds.grading.table_text import delimiter
 
 _LARGEST = 64 << 20  # bytes

@@ -8,11 +8,11 @@ from typing import Any
 
 from rds.grading.assignment.late_rules import LateRules
 from rds.grading.course.class_list import ClassList, Member
-from rds.grading.grade import Grade
+from rds.grading.grade import LISTED, Grade
 from rds.grading.review.applied import reviewed
 from rds.grading.review.entries import Review
 
-GROUP, SECTION, LISTED = "group", "section", "listed"  # of a grade's details; what the class list calls the student
+GROUP, SECTION = "group", "section"  # of a grade's details
 
 
 def everyone(
