@@ -356,3 +356,18 @@ def test_a_function_of_a_notebook_that_keeps_a_global_is_told() -> None:
     exec("i = 0\ndef control(t, r, y, state, params):\n    global i\n    i += 1\n    return i, state\n", cell)
     with pytest.warns(Notice, match="keeps `i` outside of its state.*return it in next_state"):
         from_function(cell["control"]).controller()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("        return 30 * e, state", "tabs and spaces in indentation (indent with four spaces a level, no tabs)"),
+        ("\tprint(“e”)", "(type plain quotation marks, \" or ')"),
+    ],
+)
+def test_what_an_editor_or_a_text_processor_did_is_told_with_its_remedy(tmp_path: Path, line: str, said: str) -> None:
+    file = tmp_path / "law.py"
+    file.write_text(f"def control(t, r, y, state, params):\n\te = r.position - y\n{line}\n", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        load_student(file)
+    assert said in str(refused.value)
