@@ -168,6 +168,10 @@ def _student(variables: Mapping[str, Any], source: Source, validate: bool) -> St
     # `import control` or `from scipy import interpolate` is no controller and no interpolator
     functions = {name: f for name in ARGUMENTS if callable(f := variables.get(name)) and not inspect.isclass(f)}
     if not any(name in INTERFACES for name in functions):
+        if source.path and source.text is not None and not source.text.strip():
+            raise InputError(
+                "it is empty; save your code in the editor, and look whether this is the right file", source.path
+            )
         names = ", ".join(form(name) for name in INTERFACES)
         written_here = {k: v for k, v in variables.items() if _is_written_here(v, variables)}
         hint = _system(variables) or near_misses(written_here) or _inner(source)

@@ -92,7 +92,7 @@ def test_a_helper_with_the_name_of_an_interface_is_left_alone(write):
         (CONTROL.replace("return", "yield"), ["mine.py:1", "control() is a generator", "not `yield`"]),
         ("from .other import gain\n", ["mine.py:1", "without the dot", "in one file"]),
         ("import rds.no_such_module\n", ["mine.py:1", "move what runs experiments under"]),
-        ("", ["mine.py", "control(t, r, y, state, params)", "interpolate(segment, T, params)"]),
+        ("x = 1", ["mine.py", "control(t, r, y, state, params)", "interpolate(segment, T, params)"]),
         (CONTROL.replace("control", "controll"), ["controll(); did you mean control()?"]),
         (CONTROL.replace("control", "Control"), ["Control(); did you mean control()?"]),
         ("def derivative(t, x, u, params): return x", ["did you mean derivatives()?"]),
@@ -371,3 +371,10 @@ def test_what_an_editor_or_a_text_processor_did_is_told_with_its_remedy(tmp_path
     with pytest.raises(InputError) as refused:
         load_student(file)
     assert said in str(refused.value)
+
+
+def test_an_empty_file_is_called_empty(tmp_path: Path) -> None:
+    file = tmp_path / "law.py"
+    file.write_text("\n")
+    with pytest.raises(InputError, match=r"law\.py: it is empty; save your code in the editor"):
+        load_student(file)
