@@ -82,7 +82,11 @@ def __getattr__(name: str) -> _Any:
 
         return version()
     if name not in _NAMES:
-        raise AttributeError(f"module 'rds' has no attribute {name!r}; dir(rds) lists what there is")
+        from difflib import get_close_matches
+
+        near = get_close_matches(name, _NAMES, 1)
+        meant = f"did you mean rds.{near[0]}? " if near else ""
+        raise AttributeError(f"module 'rds' has no attribute {name!r}; {meant}dir(rds) lists what there is")
     module, _, called = _NAMES[name].partition(":")
     return getattr(_import(module), called or name)
 

@@ -21,8 +21,8 @@ from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.timing import Work, judge_time
 from rds.checks.values import same, size
 from rds.core.adapt import as_controller, is_control_system
-from rds.core.blame import STUDENT_ERRORS, student_error
-from rds.core.load import wants_state
+from rds.core.blame import STUDENT_ERRORS, is_tuple_for_number, student_error
+from rds.core.load import how_to_define, missing_param, wants_state
 from rds.core.signals import declaration_fault
 from rds.core.signature import argument_fault
 from rds.core.types import Controller, Reference
@@ -182,14 +182,18 @@ class _Run:
 
     def _failed(self, error: BaseException, t: float, before: tuple[Any, ...]) -> None:
         said = student_error(error, self.source)
-        if not self.axes and not self.calls and _is_about_form(error) and self._works_with_arrays():
+        may_be_for_several = _is_about_form(error) and not is_tuple_for_number(error)
+        if not self.axes and not self.calls and may_be_for_several and self._works_with_arrays():
             return self.found.fault(clauses.RUNS, f"control() fails with one axis's numbers: {said}; {_SEVERAL}")
         if not self.calls:
             if self._is_for_want_of_state(error, before):
                 said = f"control() fails with the empty state, and there is no initial_state: {said}"
-                remedy = "define it, as in `initial_state = [0.0]`"
+                remedy = how_to_define("initial_state", "[0.0]", self.source)
                 return self.found.fault(clauses.INITIAL_STATE, f"{said}; {remedy}")
-            return self.found.fault(clauses.RUNS, f"control() failed in its first call: {said}")
+            remedy = missing_param(error, self.params, self.source)
+            return self.found.fault(
+                clauses.RUNS, "; ".join(filter(None, (f"control() failed in its first call: {said}", remedy)))
+            )
         if len(self.calls) == 1 and _is_about_form(error) and not _alike(self.initial_state, before[3]):
             returned = f"control() cannot take the next_state that it returned itself, {shown(before[3])}: {said}"
             remedy = f"return it in the form of initial_state, {shown(self.initial_state)}"

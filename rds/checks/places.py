@@ -10,7 +10,7 @@ from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, Modul
 from typing import Any
 
 from rds.checks.values import same
-from rds.core.blame import is_installed
+from rds.core.traceback_frames import is_installed
 
 _OUTSIDE = frozenset({"time", "random", "perf_counter", "monotonic", "datetime", "now", "default_rng", "randn", "rand"})
 

@@ -154,11 +154,11 @@ def _show_self(found: SelfCheck) -> None:
         ]
         for line in found.lines
     ]
-    note = "Margin: 0 % where points begin, 100 % where they are full."
+    note = "Margin: 0 % where points begin, 100 % where they are full. Worth: the points for a pass."
     if found.left_out:
         many = "criterion is" if found.left_out == 1 else "criteria are"
         note += f" {found.left_out} more {many} not tried here, worth {found.left_out_points:g} points."
-    show_table("Self-check", ["criterion", "result", "value", "margin", "points"], rows, note)
+    show_table("Self-check", ["criterion", "result", "value", "margin", "worth"], rows, note)
     for line in found.lines:
         if line.sentence and line.word != "pass":
             typer.echo(f"- {line.title}: {line.sentence}")

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import linecache
 import re
-import sysconfig
 from pathlib import Path
 from traceback import FrameSummary, extract_tb
 
 from rds.core.errors import RdsError
+from rds.core.traceback_frames import is_installed, place_of
 from rds.core.types import Source
 
 STUDENT_ERRORS = (Exception, SystemExit)
 """What a student's code may raise and its caller answers for; Ctrl-C is the user's."""
 
 _ARRAYS_AS_NUMBERS = ("only 0-dimensional arrays can be converted", "inhomogeneous shape")  # numpy's words
+_FROM_THE_CLOCK = re.compile(r"(?:/|//|%)\s*\(?\s*t\b")  # divided by what the time t stands in
 _OF_REFERENCE = re.compile(r"'float' object has no attribute '(?:position|velocity|acceleration)'")
 _LONGEST = 300  # characters of an exception's own text; some print whole arrays
 
@@ -38,9 +39,11 @@ def student_error(exc: BaseException, path_or_source: str | Path | Source | None
         return str(exc) if isinstance(exc, RdsError) else f"{type(exc).__name__}: {_text(exc)}"
     frame = own[-1]
     line = (frame.line or linecache.getline(frame.filename, frame.lineno or 0)).strip()
-    name = "a notebook cell" if "ipykernel" in frame.filename else Path(frame.filename).name
-    where = f"{name}, line {frame.lineno}, in {frame.name}"
-    return _sentence(where, type(exc).__name__, _text(exc), line)
+    where = place_of(frame)
+    text = _text(exc)
+    if isinstance(exc, ZeroDivisionError) and _FROM_THE_CLOCK.search(line):
+        text += " (in the first call t is 0; divide by the sample period, a number of your own)"
+    return _sentence(where, type(exc).__name__, text, line)
 
 
 def is_students(exc: BaseException) -> bool:
@@ -70,11 +73,9 @@ def _is_own(filename: str, path: str | Path | None) -> bool:
     return not filename.startswith("<frozen") and not is_installed(filename)
 
 
-def is_installed(filename: str) -> bool:
-    """True for a file of this package, of the standard library or of an installed package."""
-    parts = sysconfig.get_paths()
-    roots = {parts["stdlib"], parts["purelib"], parts["platlib"], str(Path(__file__).resolve().parents[1])}
-    return any(Path(filename).is_relative_to(root) for root in roots)
+def is_tuple_for_number(exc: BaseException) -> bool:
+    """Whether a number was multiplied with a list or tuple, such as 30,0 with a decimal comma."""
+    return isinstance(exc, TypeError) and "can't multiply sequence by non-int of type 'float'" in str(exc)
 
 
 def _text(exc: BaseException) -> str:
@@ -91,6 +92,14 @@ def _text(exc: BaseException) -> str:
         return f"{text} (r has it; y is the position itself)"
     if isinstance(exc, TypeError | ValueError) and any(said in text for said in _ARRAYS_AS_NUMBERS):
         return f"{text} (of an array of one number, such as a model's u, [0] is the number)"
+    if isinstance(exc, IndexError) and "index out of range" in text:
+        return f"{text} (the first value is [0]; of `state`, initial_state says how many there are)"
+    if isinstance(exc, UnboundLocalError):
+        return f"{text} (a function forgets its variables after each call: what is to last goes through `state`)"
+    if type(exc) is TypeError and "'float' object is not subscriptable" in text:
+        return f"{text} (it is one number, as r.position and y are with one axis: leave the [...] out)"
+    if type(exc) is TypeError and is_tuple_for_number(exc):
+        return f"{text} (a list or tuple stands where a number belongs; 30,0 is a tuple, 30.0 a number)"
     return f"{text} (the dict has no such key)" if type(exc) is KeyError else text  # its own text is the key alone
 
 

@@ -4,6 +4,19 @@
 class RdsError(Exception):
     """Base of all errors that the system raises on purpose."""
 
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows in place of a traceback: the user's own lines, and the message.
+
+        The frames of this package say nothing to whoever made the slip; `traceback.print_last()` has them.
+        """
+        from traceback import extract_tb
+
+        from rds.core.traceback_frames import is_installed, place_of
+
+        own = [frame for frame in extract_tb(self.__traceback__) if not is_installed(frame.filename)]
+        lines = [f"{place_of(frame)}: {frame.line}" for frame in own]
+        return [*lines, f"\x1b[31m{type(self).__name__}\x1b[0m: {self}"]
+
 
 class InputError(RdsError):
     """Something that a user wrote or named is wrong: a file, a key, a value, an option. Exit code 2.

@@ -5,12 +5,14 @@ from __future__ import annotations
 import ast
 import codecs
 import copy
+import dis
 import hashlib
 import inspect
 import io
 import re
 import tokenize
 import types
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
@@ -19,7 +21,7 @@ from typing import Any
 
 from rds.core.adapt import is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error
-from rds.core.errors import ContractError, InputError
+from rds.core.errors import ContractError, InputError, Notice
 from rds.core.interrupt import Endless, limited
 from rds.core.quantities import near
 from rds.core.run_text import run_text
@@ -86,6 +88,8 @@ class StudentFile:
         if control is None:
             raise ContractError(f"no controller: it defines no {form('control')}", self.source.name)
         merged, where = self.parameters(params), self.source.path or self.source.name
+        if not self.source.path:
+            _warn_of_globals(control)
         if self.initial_state is None and not self.starts_with_none and not coupled:
             _needs_no_state(control, merged, self.source)
         state = own_copy(self.first_state, "initial_state", where)
@@ -156,6 +160,10 @@ def _student(variables: Mapping[str, Any], source: Source, validate: bool) -> St
     # `import control` or `from scipy import interpolate` is no controller and no interpolator
     functions = {name: f for name in ARGUMENTS if callable(f := variables.get(name)) and not inspect.isclass(f)}
     if not any(name in INTERFACES for name in functions):
+        if source.path and source.text is not None and not source.text.strip():
+            raise InputError(
+                "it is empty; save your code in the editor, and look whether this is the right file", source.path
+            )
         names = ", ".join(form(name) for name in INTERFACES)
         written_here = {k: v for k, v in variables.items() if _is_written_here(v, variables)}
         hint = _system(variables) or near_misses(written_here) or _inner(source)
@@ -228,6 +236,15 @@ def _is_written_here(value: Any, variables: Mapping[str, Any]) -> bool:
     return module is None or module == variables.get("__name__", module)
 
 
+def _warn_of_globals(control: Callable[..., Any]) -> None:
+    """A file is loaded anew for each run; a function of a notebook finds in its variables what the last run left."""
+    code = getattr(inspect.unwrap(control), "__code__", None)
+    kept = {each.argval for each in dis.get_instructions(code) if each.opname == "STORE_GLOBAL"} if code else ()
+    for name in sorted(kept):
+        said = f"control() keeps `{name}` outside of its state, so the next run begins with what this one leaves there"
+        warnings.warn(Notice(f"{said}; take it from `state` and return it in next_state"), stacklevel=2)
+
+
 def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source: Source) -> None:
     """A trial call with the empty state: "index out of range" in a running loop does not say what is missing."""
     try:
@@ -235,26 +252,31 @@ def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source:
     except Endless as error:
         raise ContractError(student_error(error, source), source.path or source.name) from error
     except (IndexError, KeyError, TypeError, ValueError) as error:
-        if (
-            isinstance(error, KeyError)
-            and error.args
-            and isinstance(error.args[0], str)
-            and error.args[0] not in params
-        ):
-            raise ContractError(
-                f"control() looks for {error.args[0]!r}, which is not in params: {student_error(error, source)}; "
-                f"define it there, as in `params = {{{error.args[0]!r}: 1.0}}`",
-                source.path or source.name,
-            ) from error
+        if remedy := missing_param(error, params, source):
+            said = f"control() looks for {error.args[0]!r}, which is not in params: {student_error(error, source)}"
+            raise ContractError(f"{said}; {remedy}", source.path or source.name) from error
         if not wants_state(error, lambda state: control(0.0, Reference(0.0, 0.0, 0.0), 0.0, state, params), source):
             return  # whoever runs it reports it
         raise ContractError(
             f"control() fails with the empty state, and there is no initial_state: {student_error(error, source)}; "
-            "define initial_state, as in `initial_state = [0.0]`",
+            f"{how_to_define('initial_state', '[0.0]', source)}",
             source.path or source.name,
         ) from error
     except STUDENT_ERRORS:
         return  # not for want of a state: whoever runs it reports it
+
+
+def missing_param(error: BaseException, params: Mapping[str, Any], source: Source | None) -> str:
+    """How to define the parameter for want of which control() failed; empty where it was not that."""
+    key = error.args[0] if isinstance(error, KeyError) and error.args else None
+    return "" if not isinstance(key, str) or key in params else how_to_define("params", f"{{{key!r}: 1.0}}", source)
+
+
+def how_to_define(name: str, example: str, source: Source | None) -> str:
+    """Where a law's `name` goes: into its file, or with a function of a notebook, whose variables nobody looks at."""
+    if source is not None and source.path:
+        return f"define it, as in `{name} = {example}`"
+    return f'hand {name} over with the function, as in `{{"control": control, "{name}": {example}}}`'
 
 
 def wants_state(error: BaseException, call: Callable[[Any], Any], source: Source | None) -> bool:

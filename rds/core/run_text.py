@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import types
 import uuid
@@ -15,6 +16,10 @@ from rds.core.errors import InputError
 from rds.core.folder_kept import folder_kept
 
 STUDENT_MODULE = "rds_student_"  # how the names of modules begin that a student's file was loaded as
+_SYNTAX = {  # by what Python says, what to do, where that does not say it
+    "tabs and spaces|unindent|unexpected indent|expected an indented": " (indent with four spaces a level, no tabs)",
+    "invalid character '[“”„‘’]'": " (type plain quotation marks, \" or ')",
+}
 _PYTHON = f"Python {sys.version_info.major}.{sys.version_info.minor}"
 
 
@@ -68,7 +73,9 @@ def load_error(error: BaseException, file: Path) -> InputError:
     where = f"{file}:{line}" if line else str(file)
     if isinstance(error, SyntaxError) and Path(error.filename or "") == file:
         text = (error.text or "").strip()
-        return InputError(f"syntax error: {error.msg}{f': `{text}`' if text else ''}; {_PYTHON} cannot read it", where)
+        remedy = next((each for said, each in _SYNTAX.items() if re.search(said, error.msg or "")), "")
+        said = f"syntax error: {error.msg}{remedy}{f': `{text}`' if text else ''}"
+        return InputError(f"{said}; {_PYTHON} cannot read it", where)
     if line is None and isinstance(error, MemoryError | RecursionError):  # the parser's: no line of it has run
         said = "brackets, operators or `elif` lie too deep in each other; split them"
         return InputError(f"{_PYTHON} cannot read it: {said}", where)

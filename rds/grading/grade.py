@@ -9,6 +9,7 @@ from enum import StrEnum
 from typing import Any
 
 BEHAVIOUR, AS_SOLUTION = "behaviour", "same_loop_as_solution"  # of a grade's details: its runs
+LISTED = "listed"  # of its details: what the class list calls the student
 
 
 class Status(StrEnum):

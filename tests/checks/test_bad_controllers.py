@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -433,3 +434,10 @@ def test_a_coupled_law_must_not_write_to_its_arrays():
 
     report = check_controller(control, coupled=True)
     assert [fault.clause for fault in report.faults] == [clauses.UNCHANGED]
+
+
+def test_a_decimal_comma_is_no_law_of_several_axes(tmp_path: Path) -> None:
+    file = tmp_path / "law.py"
+    file.write_text("Kp = 30,0\ndef control(t, r, y, state, params):\n    return Kp * (r.position - y), state\n")
+    said = str(check_controller(file))
+    assert "30,0 is a tuple, 30.0 a number" in said and "--axes" not in said

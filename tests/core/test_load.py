@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rds.checks import check_controller
-from rds.core.errors import ContractError, InputError
+from rds.core.errors import ContractError, InputError, Notice
 from rds.core.load import from_function, from_namespace, load_student, student_error
 from rds.core.types import Reference
 
@@ -92,7 +92,7 @@ def test_a_helper_with_the_name_of_an_interface_is_left_alone(write):
         (CONTROL.replace("return", "yield"), ["mine.py:1", "control() is a generator", "not `yield`"]),
         ("from .other import gain\n", ["mine.py:1", "without the dot", "in one file"]),
         ("import rds.no_such_module\n", ["mine.py:1", "move what runs experiments under"]),
-        ("", ["mine.py", "control(t, r, y, state, params)", "interpolate(segment, T, params)"]),
+        ("x = 1", ["mine.py", "control(t, r, y, state, params)", "interpolate(segment, T, params)"]),
         (CONTROL.replace("control", "controll"), ["controll(); did you mean control()?"]),
         (CONTROL.replace("control", "Control"), ["Control(); did you mean control()?"]),
         ("def derivative(t, x, u, params): return x", ["did you mean derivatives()?"]),
@@ -179,7 +179,9 @@ def test_an_unknown_parameter_lists_the_known_ones(write):
 
 def test_a_missing_initial_state_is_noticed_before_the_run(write):
     text = "def control(t, r, y, state, params):\n    return state[0], state\n"
-    with pytest.raises(ContractError, match=r"no initial_state.*line 2, in control.*define initial_state"):
+    with pytest.raises(
+        ContractError, match=r"no initial_state.*line 2, in control.*define it, as in `initial_state = "
+    ):
         load_student(write(text)).controller()
     assert load_student(write("initial_state = [0.0]\n" + text)).controller().initial_state == [0.0]
     lazy = "initial_state = None\n" + text.replace("state[0], state", "0.0 if state is None else state[0], [y]")
@@ -298,13 +300,18 @@ def test_an_error_without_a_line_or_a_message_still_says_what_it_is():
     [
         ("30.0 * (r.position - y) ^ 2", r"for \^: .* \(a power is written \*\*\)"),
         ("r.postion - y", r"attribute 'postion' \(r.position, r.velocity and r.acceleration are its numbers\)"),
+        ("state[1]", r"index out of range \(the first value is \[0\]; of `state`, initial_state says how many"),
+        ("y[0]", r"not subscriptable \(it is one number, as r.position and y are"),
+        ("(30,0) * (r.position - y)", r"float' \(a list or tuple stands where a number belongs; 30,0 is a tuple"),
+        ("y / (t - 0.0)", r"division by zero \(in the first call t is 0; divide by the sample period"),
+        ("(n := n + 1)", r"variable 'n' .* \(a function forgets its variables after each call"),
         ("r.position - y.position", r"attribute 'position' \(r has it; y is the position itself\)"),
     ],
 )
 def test_a_slip_in_a_formula_is_told_with_its_remedy(tmp_path: Path, answer: str, said: str) -> None:
     file = tmp_path / "law.py"
     file.write_text(f"def control(t, r, y, state, params):\n    return {answer}, state\n")
-    with pytest.raises((AttributeError, TypeError)) as broken:
+    with pytest.raises((AttributeError, TypeError, LookupError, ArithmeticError, NameError)) as broken:
         load_student(file).functions["control"](0.0, Reference(1.0, 0.0, 0.0), 0.5, (), {})
     assert re.search(said, student_error(broken.value, file))
 
@@ -326,3 +333,48 @@ def test_a_file_of_a_python_control_system_alone_is_told_where_that_goes(write):
     named = write("import control\nderivatives = control.ss([[0, 1], [0, -9]], [[0], [1]], [[1, 0]], 0)\n")
     with pytest.raises(InputError, match=r"write `def derivatives\(t, x, u, params\)`; in it return A @ x \+ B @ u$"):
         load_student(named)
+
+
+def test_a_notebook_shows_the_users_lines_and_the_message_of_an_error() -> None:
+    """IPython's own traceback of a slip in a cell had 75 lines of this package before the message."""
+    with pytest.raises(ContractError) as broken:
+        from_function(lambda r, y: 0.0, role="control")
+    shown = broken.value._render_traceback_()
+    assert len(shown) == 2 and shown[0].startswith("test_load.py, line ") and 'role="control"' in shown[0]
+    assert "ContractError" in shown[1] and shown[1].endswith(str(broken.value))
+
+
+def test_a_function_of_a_notebook_is_told_how_its_params_go_with_it() -> None:
+    """Those of the cell are not looked at, so "define them" sent round in a circle who had."""
+    with pytest.raises(ContractError, match=r'hand params over .*`\{"control": control, "params": \{.Kp.: 1.0\}\}`'):
+        from_function(lambda t, r, y, state, params: (params["Kp"], state), role="control").controller()
+
+
+def test_a_function_of_a_notebook_that_keeps_a_global_is_told() -> None:
+    """Two runs of one experiment differed without a word."""
+    cell: dict[str, object] = {}
+    exec("i = 0\ndef control(t, r, y, state, params):\n    global i\n    i += 1\n    return i, state\n", cell)
+    with pytest.warns(Notice, match="keeps `i` outside of its state.*return it in next_state"):
+        from_function(cell["control"]).controller()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("        return 30 * e, state", "tabs and spaces in indentation (indent with four spaces a level, no tabs)"),
+        ("\tprint(“e”)", "(type plain quotation marks, \" or ')"),
+    ],
+)
+def test_what_an_editor_or_a_text_processor_did_is_told_with_its_remedy(tmp_path: Path, line: str, said: str) -> None:
+    file = tmp_path / "law.py"
+    file.write_text(f"def control(t, r, y, state, params):\n\te = r.position - y\n{line}\n", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        load_student(file)
+    assert said in str(refused.value)
+
+
+def test_an_empty_file_is_called_empty(tmp_path: Path) -> None:
+    file = tmp_path / "law.py"
+    file.write_text("\n")
+    with pytest.raises(InputError, match=r"law\.py: it is empty; save your code in the editor"):
+        load_student(file)

@@ -95,6 +95,13 @@ CAUSES = {
         PROPORTIONAL.format(gain=30.0, forward=0.567),
         ("30 V/mm: |30.1 V/mm: |29.9 V/mm: ", "filter it more"),  # the proportional gain itself
     ),
+    "runs away from a sine": (
+        SINE + RMS,
+        PROPORTIONAL.format(gain=-30.0, forward=0.0),
+        ("runs away", "Turn the sign", "`r.position - y`"),
+    ),
+    "runs away from a step": (STEP + SETTLING, PROPORTIONAL.format(gain=-30.0, forward=0.0), ("Turn the sign",)),
+    "runs away, and has no margin": (STEP + PHASE, PROPORTIONAL.format(gain=-30.0, forward=0.0), ("Turn the sign",)),
     "hardly acts": (SINE + RMS, PROPORTIONAL.format(gain=0.0, forward=0.0), ("hardly acts", "raise the gain")),
 }
 

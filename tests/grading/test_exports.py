@@ -154,6 +154,22 @@ def test_nbgrader_has_the_columns_of_its_own_export(tmp_path: Path) -> None:
     assert (bob["duedate"], bob["timestamp"]) == ("2026-11-20 22:59:00", "2026-11-21 12:00:00")
 
 
+@pytest.mark.parametrize(
+    ("to", "column", "said"),
+    [("nbgrader", "student_id", "s501"), ("moodle", "useridnumber", "s501"), ("brightspace", "Username", "#s501")],
+)
+def test_without_a_gradebook_students_are_called_as_in_the_class_list(
+    to: str, column: str, said: str, tmp_path: Path
+) -> None:
+    """A platform that knows s501 finds no "Ada Lovelace_501"."""
+    out = batch_in(
+        tmp_path / "out", [from_platform("moodle", "Ada Lovelace_501", name="Ada Lovelace"), grade("Bob Builder_502")]
+    )
+    (out / "class.csv").write_text("student,name\ns501,Ada Lovelace\n")
+    ada, bob = rows_of(Path(export(out, to, None, NOTHING).files[0]))
+    assert ada[column] == said and bob[column].removeprefix("#") == "Bob Builder_502"
+
+
 def test_nbgrader_takes_the_name_from_its_folders(tmp_path: Path) -> None:
     done = exported(tmp_path, "nbgrader", [from_platform("nbgrader", "ada", assignment="ps1")])
     assert rows_of(Path(done.files[0]))[0]["assignment"] == "ps1"

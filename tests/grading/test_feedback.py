@@ -95,17 +95,27 @@ def test_points_penalty_and_reason_are_said(assignment: Assignment) -> None:
     late = replace(grade("ada", score=20.8), late_days=1.25)
     page = feedback_page(assignment, late)
     assert "20.8 of 30 points" in page
-    assert "1.25 days after the due time: 5.2 of the 26 points earned are lost" in page
+    assert "1.25 days after the due time: 5.2 of the 26 points earned are lost, 20 %; each day that has begun" in page
     broken = feedback_page(assignment, grade("bob", Status.BROKE_CONTRACT))
     assert "broke the contract" in broken and "control() returned nan at t = 0.5 s" in broken
     ours = feedback_page(assignment, grade("cy", Status.GRADER_ERROR))
     assert "not graded yet" in ours and "0 of 30" not in ours
 
 
+def test_the_page_names_the_file_and_when_it_came(assignment: Assignment) -> None:
+    about = {"file": "Übung 1.py", "handed_in": "2026-12-02T18:30:00+01:00"}
+    page = feedback_page(assignment, replace(grade(), sha256="f7a4", details=about))
+    assert "graded, <bdi>Übung 1.py</bdi>, handed in 2026-12-02 18:30:00+01:00; its SHA-256: f7a4" in page
+
+
 def test_hidden_cases_and_values_are_shown_only_if_the_assignment_says_so(assignment: Assignment) -> None:
     runs = [run_with(0.1), run_with(0.2, "hidden sine")]
     page = feedback_page(assignment, grade(), runs)
-    assert "secret 0.23 mm" not in page and "20 of 20 points" in page
+    assert "secret 0.23 mm" not in page and "20 of 20 points" in page and "it counts only" not in page
+    lost = score("hidden", 0.0, 20.0, visible=False, sentence="secret 0.23 mm", gate="Error rms")
+    gated = feedback_page(assignment, grade("ada", Status.OK, score(), lost), runs)
+    assert "value is not shown; it counts only as far as points are earned for Error rms" in gated
+    assert "secret 0.23 mm" not in gated
     assert page.count("<img") == 1 and "hidden sine" not in page
     assert "Hidden cases, not shown: 1" in page
     whole = feedback_page(replace(assignment, feedback="all"), grade(), runs)

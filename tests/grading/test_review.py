@@ -218,6 +218,23 @@ def test_points_by_hand_for_nothing_handed_in_are_an_attempt(tmp_path: Path) -> 
     assert ada.score == 5.0
 
 
+def test_graders_name_students_as_the_class_list_does(tmp_path: Path) -> None:
+    out = made(tmp_path / "1", replace(grade("Ada Lovelace_501"), details={"source": {"name": "Ada Lovelace"}}))
+    (out / "class.csv").write_text("student,name\ns501,Ada Lovelace\n")
+    _, finished = say(out, [replace(points(8.0), student="s501")])
+    assert finished.grades[0].score == 28.0
+    assert "student,class list,status" in (out / "grades.csv").read_text("utf-8-sig")
+    assert "Ada Lovelace_501,s501,ok," in (out / "grades.csv").read_text("utf-8-sig")
+
+
+def test_a_gate_that_takes_another_share_is_no_change_of_bands(tmp_path: Path) -> None:
+    half = score(points=3.0, gate="Smooth", sentence="It is 0.23 mm (none from 1 mm on); 50 % of that count.")
+    less = score(points=0.0, gate="Smooth", sentence="It is 0.23 mm (none from 1 mm on); it counts only where Smooth.")
+    before, now = (read_finished(made(tmp_path / n, grade("ada", Status.OK, s))) for n, s in (("a", less), ("b", half)))
+    (change,) = changes_of(before, now)
+    assert change.why[0] == "rms: 0 → 3 points, because the gate Smooth takes another share"
+
+
 def test_who_changes_is_told_with_the_reason(tmp_path: Path) -> None:
     before = read_finished(made(tmp_path / "1", grade("ada", Status.OK, score(), score("old", 1.0))))
     new = (replace(score(points=8.0), value=0.23), score("new", 2.0))

@@ -55,6 +55,15 @@ def test_an_assignment_that_is_not_there_is_the_task_s_error(tmp_path: Path) -> 
     assert task.wait(120) and isinstance(task.error, InputError) and "assignment" in str(task.error)
 
 
+def test_a_class_list_goes_to_the_batch(tmp_path: Path) -> None:
+    state = GradingState(Session(tmp_path))
+    for name in ("assignment", "submissions", "out", "class_list"):
+        state.choices.set(name, name)
+    (tmp_path / "submissions").mkdir()
+    task = state.grade()
+    assert task.wait(120) and "class_list" in str(task.error), task.error
+
+
 def test_what_a_command_says_is_plain_text_in_a_notebook_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")  # as IPython's kernel does
     monkeypatch.setenv("CLICOLOR_FORCE", "1")

@@ -14,7 +14,7 @@ from rds.grading.assignment.late_rules import LateRules
 from rds.grading.batch.record import FILE as RECORD
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.course.class_list import ClassList, read_class_list
-from rds.grading.grade import Grade, Status
+from rds.grading.grade import LISTED, Grade, Status
 from rds.grading.intake.names import safe_id
 from rds.grading.review.entries import Review, read_review
 from rds.grading.review.everyone import everyone
@@ -63,6 +63,13 @@ class Finished:
         failed = {grade.student for grade in self.grades if grade.status is Status.GRADER_ERROR}
         known = {grade.student for grade in self.grades} | set(self.measured)
         return tuple(sorted(failed | (set(self.record.get("handed_in", ())) - known)))
+
+    def called(self, name: str) -> str:
+        """The student whom the class list calls `name`, as this batch calls him; `name` itself of all others."""
+        if name in self.of or name in self.of.values():
+            return name
+        found = [grade.student for grade in self.grades if grade.details.get(LISTED) == name]
+        return found[0] if len(found) == 1 else name
 
     def time(self, student: str) -> datetime | None:
         """When the student, or the student's group, handed in, where that is known."""

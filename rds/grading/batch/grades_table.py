@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 from rds.grading.feedback.plain_text import cell, csv_line
-from rds.grading.grade import CriterionScore, Grade, Status
+from rds.grading.grade import LISTED, CriterionScore, Grade, Status
 from rds.results.units import heading
 
 
@@ -16,11 +16,13 @@ def grades_csv(grades: Sequence[Grade]) -> Iterator[str]:
     A submission that the grader could not grade has no points at all, rather than none.
     """
     criteria = criteria_of(grades)
-    columns = ["student", "status", "score", "max_score", "before_penalty", "late [days]"]
+    listed = any(grade.details.get(LISTED, grade.student) != grade.student for grade in grades)
+    columns = ["student", *(["class list"] if listed else []), "status", "score", "max_score", "before_penalty"]
+    columns.append("late [days]")
     for criterion in criteria:
         columns.append(f"{criterion.name} [points of {_plain(criterion.max_score)}]")
         columns.append(heading(f"{criterion.name} value", "" if criterion.unit == "1" else criterion.unit))
-    return _csv_lines(chain([[*columns, "reason", "sha256"]], (_row(grade, criteria) for grade in grades)))
+    return _csv_lines(chain([[*columns, "reason", "sha256"]], (_row(grade, criteria, listed) for grade in grades)))
 
 
 def criteria_of(grades: Iterable[Grade]) -> list[CriterionScore]:
@@ -42,11 +44,12 @@ def _csv_lines(rows: Iterable[Sequence[str | float | None]]) -> Iterator[str]:
         yield csv_line(_cell(value) for value in row)
 
 
-def _row(grade: Grade, criteria: Sequence[CriterionScore]) -> list[str | float | None]:
+def _row(grade: Grade, criteria: Sequence[CriterionScore], listed: bool) -> list[str | float | None]:
     is_graded = grade.status not in (Status.GRADER_ERROR, Status.EXCUSED)
     scores = {score.name: score for score in grade.criteria} if is_graded else {}
     points = [grade.score if is_graded else None, grade.max_score, grade.before_penalty if is_graded else None]
-    row: list[str | float | None] = [grade.student, str(grade.status), *points, grade.late_days]
+    row: list[str | float | None] = [grade.student, *([str(grade.details.get(LISTED, ""))] if listed else [])]
+    row += [str(grade.status), *points, grade.late_days]
     for criterion in criteria:
         score = scores.get(criterion.name)
         row += [None, None] if score is None else [score.score, score.value]

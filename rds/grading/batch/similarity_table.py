@@ -12,6 +12,7 @@ from rds.grading.feedback.plain_text import one_line
 from rds.results.html import table
 
 MOST = 100  # pairs on the page; the file has all
+_OPEN = 10  # pairs that are shown at once; more are folded, so that what stands below is not pushed away
 _NAME = 60  # characters
 _NOTE = (
     "How much of the smaller program's structure both have, whatever the names, numbers, comments and layout. What "
@@ -74,7 +75,10 @@ def _alike(pairs: Sequence[Mapping[str, Any]]) -> str:
         "lines of the second",
         "both from",
     ]
-    return table(heads, rows, "", note)
+    many = f"{len(pairs)} pairs of programs" if len(pairs) > 1 else "one pair of programs"
+    summary = f"{many} with {100 * LEAST_SCORE:.0f} % of their structure or more in common"
+    is_open = " open" if len(pairs) <= _OPEN else ""
+    return f"<details{is_open}><summary>{summary}</summary>{table(heads, rows, '', note)}</details>"
 
 
 def alike_json(pairs: Sequence[Pair], identical: Sequence[Identical] = (), loops: Sequence[SameLoop] = ()) -> bytes:

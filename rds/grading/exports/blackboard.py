@@ -12,15 +12,15 @@ import re
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, read_sheet, source, unknown
+from rds.grading.exports.roster import Key, Sheet, find, identifiers, read_sheet, source, unknown
 
 FILE = "blackboard.xls"
 USES = ("gradebook", "column", "points")
 _PEOPLE = ("Last Name", "First Name", "Username", "Student ID")
 _COLUMN = re.compile(r"(?P<name>.*?)\s*\[Total Pts: (?P<points>[^\]]*)\]\s*(?:\|(?P<id>\d+))?\s*")
 _KEYS = (
-    Key("Username", lambda grade: [grade.student, *source(grade, "sid", "email")]),
-    Key("Student ID", lambda grade: [grade.student, *source(grade, "sid")]),
+    Key("Username", lambda grade: [*identifiers(grade), *source(grade, "sid", "email")]),
+    Key("Student ID", lambda grade: [*identifiers(grade), *source(grade, "sid")]),
 )
 
 

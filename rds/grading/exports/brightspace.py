@@ -12,7 +12,7 @@ import re
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, read_sheet, source, unknown
+from rds.grading.exports.roster import Key, Sheet, find, identifiers, names_here, read_sheet, source, unknown
 
 FILE = "brightspace.csv"
 USES = ("gradebook", "column", "points")
@@ -27,8 +27,8 @@ def _bare(cell: str) -> str:
 
 
 _KEYS = (
-    Key("OrgDefinedId", lambda grade: [*source(grade, "sid"), grade.student], _bare),
-    Key("Username", lambda grade: [grade.student, *source(grade, "email", "sid")], _bare),
+    Key("OrgDefinedId", lambda grade: [*source(grade, "sid"), *identifiers(grade)], _bare),
+    Key("Username", lambda grade: [*identifiers(grade), *source(grade, "email", "sid")], _bare),
     Key("Email", lambda grade: [*source(grade, "email"), grade.student]),
 )
 
@@ -39,7 +39,8 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
     factor, item = scale(finished, wanted.points), wanted.column or finished.title
     if wanted.gradebook is None:
         heads = ["Username", f"{item} Points Grade", _END]
-        rows = [[_text(grade.student), scaled(grade.score, factor), _MARK] for grade in finished.to_hand_on]
+        called = names_here(finished.to_hand_on)
+        rows = [[_text(called[each.student]), scaled(each.score, factor), _MARK] for each in finished.to_hand_on]
         note = "students are known by Username; with --gradebook FILE they are found in your own export"
         return Exported({FILE: Sheet(heads, rows, False).to_bytes()}, notes=(note,), students=len(rows))
     sheet = read_sheet(wanted.gradebook)

@@ -11,7 +11,7 @@ import re
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, platform, read_sheet, source, unknown
+from rds.grading.exports.roster import Key, Sheet, find, identifiers, platform, read_sheet, source, unknown
 from rds.grading.intake.names import letters
 
 FILE = "canvas.csv"
@@ -23,8 +23,8 @@ _OWN = re.compile(r"(?:Current|Final) (?:Score|Points|Grade)|Override (?:Score|G
 _EXCUSED = "EX"  # Canvas's own word for a student who needs no grade
 _KEYS = (
     Key("ID", lambda grade: platform(grade, "canvas", "id")),
-    Key("SIS User ID", lambda grade: [grade.student, *source(grade, "sid")]),
-    Key("SIS Login ID", lambda grade: [grade.student, *source(grade, "email", "sid")]),
+    Key("SIS User ID", lambda grade: [*identifiers(grade), *source(grade, "sid")]),
+    Key("SIS Login ID", lambda grade: [*identifiers(grade), *source(grade, "email", "sid")]),
     Key("Student", lambda grade: [*source(grade, "name"), grade.student], letters),
 )
 

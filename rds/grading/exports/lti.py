@@ -13,7 +13,7 @@ from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
-from rds.grading.exports.roster import source
+from rds.grading.exports.roster import identifiers, source
 from rds.grading.exports.said import of_grade
 from rds.grading.grade import Grade
 from rds.grading.lti.launches import Launched, read_launches, student_of
@@ -54,7 +54,7 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
 
 
 def _launch_of(grade: Grade, launches: dict[str, Launched]) -> Launched | None:
-    names = [grade.student, *(student_of("", each) for each in source(grade, "email"))]
+    names = [*identifiers(grade), *(student_of("", each) for each in source(grade, "email"))]
     return next((launches[name] for name in names if name in launches), None)
 
 

@@ -11,7 +11,7 @@ from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import csv_text
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, platform, read_sheet, source, unknown
+from rds.grading.exports.roster import Key, Sheet, find, identifiers, names_here, platform, read_sheet, source, unknown
 from rds.grading.exports.said import comment
 from rds.grading.grade import Grade
 from rds.grading.intake.names import letters
@@ -22,7 +22,7 @@ USES = ("gradebook", "column", "points")
 _WORKSHEET = ("Identifier", "Grade", "Last modified (grade)")
 KEYS = (
     Key("Identifier", lambda grade: platform(grade, "moodle", "id"), lambda cell: cell.rpartition(" ")[2]),
-    Key("ID number", lambda grade: [grade.student, *source(grade, "sid")]),
+    Key("ID number", lambda grade: [*identifiers(grade), *source(grade, "sid")]),
     Key("Email address", lambda grade: [*source(grade, "email"), grade.student]),
     Key("Full name", lambda grade: [*source(grade, "name"), grade.student], letters),
 )
@@ -98,7 +98,12 @@ def _check_points(finished: Finished, sheet: Sheet, row: list[str], factor: floa
 
 def _plain(finished: Finished, wanted: ExportOptions) -> Exported:
     factor = scale(finished, wanted.points)
-    rows = [_plain_row(grade, factor) for grade in finished.to_hand_on if _ESCAPE not in grade.student]
+    called = names_here(finished.to_hand_on)
+    rows = [
+        _plain_row(grade, called[grade.student], factor)
+        for grade in finished.to_hand_on
+        if _ESCAPE not in grade.student
+    ]
     odd = [grade.student for grade in finished.to_hand_on if _ESCAPE in grade.student]
     text = csv_text([["useridnumber", "useremail", wanted.column or finished.title], *rows])
     note = "map useridnumber or useremail when Moodle asks; with --gradebook FILE the file fills in a download"
@@ -106,7 +111,7 @@ def _plain(finished: Finished, wanted: ExportOptions) -> Exported:
     return Exported({FILE: text.encode()}, dict.fromkeys(odd, said), (note,), len(rows))
 
 
-def _plain_row(grade: Grade, factor: float) -> list[str | float | None]:
-    emails = source(grade, "email") or ([grade.student] if "@" in grade.student else [])
-    numbers = source(grade, "sid") or ([] if "@" in grade.student else [grade.student])
+def _plain_row(grade: Grade, name: str, factor: float) -> list[str | float | None]:
+    emails = source(grade, "email") or ([name] if "@" in name else [])
+    numbers = source(grade, "sid") or ([] if "@" in name else [name])
     return ["".join(numbers[:1]), "".join(emails[:1]), float(scaled(grade.score, factor))]

@@ -9,7 +9,7 @@ from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import csv_text
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.nbgrader_gradebook import assignment_name, into_gradebook, naive_utc
-from rds.grading.exports.roster import source
+from rds.grading.exports.roster import names_here, source
 from rds.grading.grade import Grade
 
 FILE = "nbgrader.csv"
@@ -35,12 +35,13 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
     if wanted.gradebook is not None:
         return into_gradebook(finished, wanted)
     name, factor = assignment_name(finished, wanted), scale(finished, wanted.points)
-    rows = [_row(finished, grade, name, factor) for grade in finished.to_hand_on]
+    called = names_here(finished.to_hand_on)
+    rows = [_row(finished, grade, called[grade.student], name, factor) for grade in finished.to_hand_on]
     text = csv_text([COLUMNS, *rows])
     return Exported({FILE: text.encode()}, students=len(rows))
 
 
-def _row(finished: Finished, grade: Grade, assignment: str, factor: float) -> list[str | float | None]:
+def _row(finished: Finished, grade: Grade, student: str, assignment: str, factor: float) -> list[str | float | None]:
     handed_in = finished.time(grade.student)
     numbers = (grade.before_penalty, grade.before_penalty - grade.score, grade.score, grade.max_score)
     email = source(grade, "email")
@@ -48,7 +49,7 @@ def _row(finished: Finished, grade: Grade, assignment: str, factor: float) -> li
         assignment,
         naive_utc(finished.due),
         naive_utc(handed_in),
-        grade.student,
+        student,
         "",
         "",
         email[0] if email else "",

@@ -16,7 +16,7 @@ from rds.core.installed import pip_install
 from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import criteria_of
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
-from rds.grading.exports.roster import platform
+from rds.grading.exports.roster import names_here, platform
 from rds.grading.grade import Grade
 
 NOTEBOOK = "rds"
@@ -60,22 +60,24 @@ def _write(gradebook: Any, finished: Finished, wanted: ExportOptions) -> Exporte
         gradebook.update_or_create_grade_cell(criterion.name, NOTEBOOK, name, max_score=points, cell_type="code")
     known = {student.id for student in gradebook.students}
     unmatched: dict[str, str] = {}
+    called = names_here(finished.to_hand_on)
     for grade in finished.to_hand_on:
-        if known and grade.student not in known:
+        student = called[grade.student] if called[grade.student] in known or not known else grade.student
+        if known and student not in known:
             unmatched[grade.student] = "no student of the gradebook has this identifier"
             continue
-        _student(gradebook, finished, grade, name, factor)
+        _student(gradebook, finished, grade, student, name, factor)
     count = len(finished.to_hand_on) - len(unmatched)
     return Exported({}, unmatched, (f"assignment {name!r}, notebook {NOTEBOOK!r}",), count)
 
 
-def _student(gradebook: Any, finished: Finished, grade: Grade, name: str, factor: float) -> None:
-    gradebook.update_or_create_student(grade.student)
+def _student(gradebook: Any, finished: Finished, grade: Grade, student: str, name: str, factor: float) -> None:
+    gradebook.update_or_create_student(student)
     time = naive_utc(finished.time(grade.student))
-    gradebook.update_or_create_submission(name, grade.student, **({"timestamp": time} if time else {}))
-    notebook = _notebook(gradebook, name, grade.student)
+    gradebook.update_or_create_submission(name, student, **({"timestamp": time} if time else {}))
+    notebook = _notebook(gradebook, name, student)
     for score in grade.criteria:
-        given = gradebook.find_grade(score.name, NOTEBOOK, name, grade.student)
+        given = gradebook.find_grade(score.name, NOTEBOOK, name, student)
         given.auto_score, given.manual_score = float(scaled(score.score, factor)), None
         given.needs_manual_grade = False
     lost = grade.before_penalty - grade.score

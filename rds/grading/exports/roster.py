@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rds.core.errors import InputError
 from rds.grading.feedback.plain_text import one_line
-from rds.grading.grade import Grade
+from rds.grading.grade import LISTED, Grade
 from rds.grading.intake.names import compared
 from rds.grading.table_text import delimiter
 
@@ -138,6 +139,20 @@ def unknown(sheet: Sheet, known: Collection[int], column: str) -> tuple[str, ...
         f"{len(names)} of the gradebook have no grade here, and their cells stay as they are: "
         f"{'; '.join(names[:_MOST_NAMES])}{more}. Give `rds grade run` the class list, and it is 0",
     )
+
+
+def identifiers(grade: Grade) -> list[str]:
+    """The student's identifiers: that of the class list first, where it has the student; then that of what came in."""
+    return list(dict.fromkeys((str(grade.details.get(LISTED) or grade.student), grade.student)))
+
+
+def names_here(grades: Iterable[Grade]) -> dict[str, str]:
+    """What a gradebook without an instructor's own file calls each student: the class list's identifier where it is
+    one student's, else that of what was handed in.
+    """
+    best = {grade.student: identifiers(grade)[0] for grade in grades}
+    counts = Counter(best.values())
+    return {student: name if counts[name] == 1 else student for student, name in best.items()}
 
 
 def source(grade: Grade, *names: str) -> list[str]:

@@ -19,6 +19,7 @@ from rds.results.units import heading
 LEAST = 0.5  # of the error's square: what a cause must explain to be named
 SHORT = 0.5  # of the motion that is asked for: an axis that makes less than that does not follow
 SATURATED = 0.1  # of the time at the converter's limit: then nothing else is said
+_AWAY, _OPPOSITE = 2.0, 0.9  # times the reference's largest value; of the samples: an axis that is driven off
 _SWINGS = 4.0  # times the reference's own frequency: what is faster is the loop's
 
 
@@ -41,6 +42,8 @@ def cause(run: CaseRun, criterion: Criterion, score: CriterionScore) -> Cause:
     unit = run.result.units.get(f"{axis}_measured", "mm")
     if short := _falls_short(run, axis):
         return Cause(short, (_panel(run, axis, error, None, unit), voltage_panel(run, axis)))
+    if away := wrong_sign(run, axis):
+        return Cause(away, (_panel(run, axis, error, None, unit), voltage_panel(run, axis)))
     saturated = saturation(run, axis, chosen)
     if saturated > SATURATED:
         said = (
@@ -62,6 +65,25 @@ def cause(run: CaseRun, criterion: Criterion, score: CriterionScore) -> Cause:
         )
         return Cause(said, (_panel(run, axis, error, None, unit),))
     return Cause(_said(part, axis, unit), (_panel(run, axis, error, part, unit),))
+
+
+def wrong_sign(run: CaseRun, axis: str) -> str:
+    """That the voltage drives the axis away from its reference; empty where it does not.
+
+    It has the sign opposite to the error's in nearly all samples, and the error outgrows all that is asked for.
+    """
+    error, name = error_of(run, axis), f"{axis}_command"
+    voltage = run.result[name if name in run.result else f"{axis}_voltage"]
+    if not (np.isfinite(error).all() and abs(error[-1]) > _AWAY * np.abs(run.result[f"{axis}_reference"]).max()):
+        return ""
+    opposite = float(np.mean(voltage * error < 0.0))
+    if opposite < _OPPOSITE:
+        return ""
+    return (
+        f"Axis {axis} runs away: in {100 * opposite:.0f} % of the samples the voltage has the sign opposite to the "
+        "error's, and drives the axis further off. Turn the sign: a voltage above 0 moves the axis forward, so the law "
+        "needs the reference minus the measurement, `r.position - y`."
+    )
 
 
 def _falls_short(run: CaseRun, axis: str) -> str:

@@ -9,7 +9,7 @@ from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.criterion import Criterion
 from rds.grading.criteria.linear import LinearLoop, NoLoop
 from rds.grading.feedback.advice import Cause
-from rds.grading.feedback.causes_of_errors import error_panels
+from rds.grading.feedback.causes_of_errors import error_panels, wrong_sign
 from rds.grading.feedback.chart import Curve, Panel
 from rds.grading.grade import CriterionScore
 from rds.identification.robustness.margins import margins_of
@@ -26,6 +26,8 @@ def cause(run: CaseRun, criterion: Criterion, score: CriterionScore) -> Cause:
     if not loops:
         grows = any(isinstance(loop, NoLoop) and loop.is_known for loop in run.linear or ())
         mend = " Take less gain, or give it more damping (more derivative action)." if grows else ""
+        if away := next(filter(None, (wrong_sign(run, axis) for axis in run.result.axes)), ""):
+            mend = f" {away}"
         return Cause(score.sentence + mend, error_panels(run))
     loop = min(loops, key=lambda each: each.margins[2])
     w, locus = loop.locus(_GRID)

@@ -9,7 +9,7 @@ from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.criterion import Criterion
 from rds.grading.criteria.measuring import NotMeasured, Step, step_of
 from rds.grading.feedback.advice import Cause
-from rds.grading.feedback.causes_of_errors import SATURATED, saturation, voltage_panel
+from rds.grading.feedback.causes_of_errors import SATURATED, saturation, voltage_panel, wrong_sign
 from rds.grading.feedback.chart import Curve, Panel
 from rds.grading.grade import CriterionScore
 
@@ -35,6 +35,8 @@ def cause(run: CaseRun, criterion: Criterion, score: CriterionScore) -> Cause:
         Panel([Curve("error", step.time, -100.0 * error, BLUE)], "error [% of the step]", "time from the step [s]"),
         Panel([Curve("response", step.time, step.share, BLUE)], "share of the step", "time from the step [s]", band),
     ]
+    if away := wrong_sign(run, axis):
+        return Cause(away, (*panels, voltage_panel(run, axis)))
     return _said(run, axis, step, error, within, panels)
 
 

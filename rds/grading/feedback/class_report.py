@@ -23,6 +23,7 @@ _STYLE = f"""<style>
 .cards {{ display: flex; flex-wrap: wrap; gap: 1rem 2.5rem; }} .cards figure {{ margin: 0; max-width: 412px; }}
 figcaption {{ font-weight: 600; }} td, p {{ overflow-wrap: anywhere; }} td {{ max-width: 28rem; }}
 td.number, td.status {{ white-space: nowrap; }} td.reason {{ min-width: 22rem; }}
+.everybody td:first-child {{ min-width: 9rem; }}
 td.gate {{ color: var(--missed); font-weight: 700; }} td.review {{ color: var(--void); font-weight: 700; }}
 {histogram.STYLE}</style>"""
 
@@ -194,8 +195,13 @@ def _slowest(grades: Sequence[Grade], links: Mapping[str, str], seconds: Mapping
 def _everybody(grades: Sequence[Grade], links: Mapping[str, str]) -> Iterator[str]:
     criteria = criteria_of(grades)
     heads = ["student", "status", "score", "late [days]", *(criterion.name for criterion in criteria), "reason"]
-    head = "".join(f'<th scope="col">{escape(one_line(each))}</th>' for each in heads)
-    yield f'<section><h2>Everybody</h2><div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>'
+    texts = ("student", "status", "reason")
+    kinds = ["" if each in texts else ' class="number"' for each in heads]
+    head = "".join(
+        f'<th scope="col"{kind}>{escape(one_line(each))}</th>' for each, kind in zip(heads, kinds, strict=True)
+    )
+    yield '<section class="everybody"><h2>Everybody</h2><div class="scroll"><table>'
+    yield f"<thead><tr>{head}</tr></thead><tbody>"
     names = [criterion.name for criterion in criteria]
     for grade in grades:
         yield _student(grade, names, links)

@@ -151,11 +151,11 @@ def _total(grade: Grade) -> str:
     lost = grade.before_penalty - grade.score
     if grade.late_days > 0.0 and not is_excused:
         said = f"Handed in {grade.late_days:.3g} days after the due time: "
-        said += (
-            f"{lost:.4g} of the {grade.before_penalty:.4g} points earned are lost."
-            if lost > 0.0
-            else "nothing is lost."
-        )
+        if lost > 0.0:
+            said += f"{lost:.4g} of the {grade.before_penalty:.4g} points earned are lost, "
+            said += f"{100 * lost / grade.before_penalty:.3g} %; each day that has begun counts."
+        else:
+            said += "nothing is lost."
         parts.append(f'<p class="note">{said}</p>')
     if grade.status is not Status.OK:
         parts.append(
@@ -185,7 +185,8 @@ def _criterion(score: CriterionScore, criterion: Criterion | None, is_shown: boo
         f"points</b> · {_BANDS[score.band]}"
     )
     if not is_shown:
-        return f'<div class="criterion"><div>{head} · hidden: its value is not shown</p></div></div>'
+        gate = f"; it counts only as far as points are earned for {escape(score.gate)}" if score.gate else ""
+        return f'<div class="criterion"><div>{head} · hidden: its value is not shown{gate}</p></div></div>'
     value = "" if score.value is None else f" · {escape(with_unit(score.value, score.unit))}"
     bar = "" if criterion is None else band_bar.band_bar(criterion.bands, score.value, score.unit)
     return (
@@ -221,5 +222,13 @@ def _notes(grade: Grade) -> str:
     parts = [f'<pre class="printed">{escape(plain(note))}</pre>' for note in grade.notes]
     head = "<h2>Notes, and what your file printed</h2>" if parts else ""
     if grade.sha256:
-        parts.append(f'<p class="note">SHA-256 of the file that was graded: {escape(grade.sha256)}</p>')
+        parts.append(f'<p class="note">{_file(grade)}</p>')
     return f"<section>{head}{''.join(parts)}</section>" if parts else ""
+
+
+def _file(grade: Grade) -> str:
+    """Which file was graded, and when it was handed in, where that is known."""
+    name, time = (str(grade.details.get(key) or "") for key in ("file", "handed_in"))
+    called = f", {isolated(name)}" if name else ""
+    when = f", handed in {escape(time.replace('T', ' '))}" if time else ""
+    return f"The file that was graded{called}{when}; its SHA-256: {escape(grade.sha256)}"

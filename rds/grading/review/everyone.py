@@ -8,7 +8,7 @@ from typing import Any
 
 from rds.grading.assignment.late_rules import LateRules
 from rds.grading.course.class_list import ClassList, Member
-from rds.grading.grade import Grade
+from rds.grading.grade import LISTED, Grade
 from rds.grading.review.applied import reviewed
 from rds.grading.review.entries import Review
 
@@ -45,6 +45,7 @@ def _of_member(grade: Grade, member: Member | None, is_group: bool) -> Grade:
         source = next((dict(each) for name, each in by.items() if _is(member, name, each)), {})
         about[GROUP] = grade.student
     about["source"] = {**member.source, **source}
+    about[LISTED] = member.student
     if member.section:
         about[SECTION] = member.section
     return replace(grade, student=member.student if is_group else grade.student, details=about)

@@ -115,9 +115,16 @@ def _cause(old: CriterionScore, new: CriterionScore) -> str:
         return f"because its value was {_value(old)} and is {_value(new)}"
     if old.max_score != new.max_score:
         return f"because it was worth {old.max_score:g} points and is worth {new.max_score:g}"
+    if old.gate and old.gate == new.gate and _of_bands(old) == _of_bands(new):
+        return f"because the gate {new.gate} takes another share"
     if old.gate != new.gate:
         return f"because of the gate {new.gate}" if new.gate else f"because the gate {old.gate} takes nothing now"
     return f"because its bands are others (the same value, {_value(new)})"
+
+
+def _of_bands(score: CriterionScore) -> str:
+    """What its sentence says of the value and its bands, before it comes to a gate."""
+    return score.sentence.partition(";")[0].rstrip(".")
 
 
 def _value(score: CriterionScore) -> str:

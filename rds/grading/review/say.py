@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rds.core.errors import InputError
@@ -21,6 +22,7 @@ def say(out: Path, entries: Sequence[Entry]) -> tuple[list[Entry], Finished]:
     """Add what a grader says to the batch in `out`, and write all out again. InputError for what has no place there."""
     finished = read_finished(out)
     assignment_of(finished)  # before anything is written
+    entries = [replace(each, student=finished.called(each.student)) for each in entries]
     for each in entries:
         check(each, finished)
     return add(out, entries), publish(out)

@@ -25,9 +25,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rds.core.blame import is_installed
 from rds.core.garbage import leave
 from rds.core.private_files import keep_process_private, open_private, write_private
+from rds.core.traceback_frames import is_installed
 from rds.core.types import Ending
 from rds.modes.loop.changes import FILE as CHANGES
 from rds.modes.loop.changes import STOP, as_text, read_changes, timed

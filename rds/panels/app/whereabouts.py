@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rds.core.blame import is_installed
+from rds.core.traceback_frames import is_installed
 
 _FRAME = re.compile(r'^  File "(.+)", line (\d+) in (.+)$')
 _PATIENCE = 3.0  # s for an answer, on a busy computer

@@ -63,7 +63,7 @@ class GradingView:
         again = button("Grade again", tip, self.regrade, say)
         kind, by = self._fields("kind", "by")
         self._words = {name: self._fields(name)[0] for name in dict.fromkeys(chain(*USES.values()))}
-        self._batch = self._fields("assignment", "submissions", "out", "jobs", "scheduler")
+        self._batch = self._fields("assignment", "submissions", "out", "class_list", "jobs", "scheduler")
         side = [
             group("Batch", *self._batch, row(check, self._run)),
             group("Review", kind, *self._words.values(), by, row(words)),
@@ -156,6 +156,8 @@ class GradingView:
 
     def _changed(self, name: str) -> None:
         self._name_button()
+        if name == "out" and self.state.started():
+            attempt("the class as it stands", self.show, self.notice)
         if name == "kind":
             self._show_words()
 

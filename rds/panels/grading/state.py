@@ -72,6 +72,7 @@ class GradingState:
         words = [
             *("run", str(self._path("assignment", "the assignment's folder"))),
             *(str(self._path("submissions", "the folder of submissions")), "-o", str(self.out), "--json"),
+            *(["--class", str(self._path("class_list", "the class list"))] if self.choices["class_list"] else []),
             *self._jobs(),
             *(["--scheduler", self.choices["scheduler"]] if self.choices["scheduler"] else []),
             *(["--resume"] if self.started() else []),
@@ -303,6 +304,8 @@ def _fields() -> Iterable[Field]:
     yield Text(
         "out", "Grades", "a new folder for grades and feedback, or that of a batch to go on with", "", "e.g. grades"
     )
+    told = "a table of the students: sections, groups, extensions; empty: none, or that of a batch to go on with"
+    yield Text("class_list", "Class list", told, "", "e.g. class.csv")
     yield Number("jobs", "Jobs", "processes side by side", None, low=1, high=256, whole=True, optional=True)
     yield Text("scheduler", "Scheduler", "of a dask cluster; empty: this computer", "", "e.g. tls://host:8786")
     yield from review_fields()
