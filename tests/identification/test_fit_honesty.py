@@ -196,6 +196,27 @@ def test_a_log_sampled_too_slowly_gives_no_model_and_says_which_period_would_do(
     assert "in seconds" not in " ".join(found.warnings)
 
 
+def test_an_axis_on_a_spring_is_no_want_of_samples_and_its_model_is_not_valid() -> None:
+    """The fit puts tau at 0, where it is ten samples: no faster sampling would help."""
+    pull, steps = 5.0, 5  # 1/s, speed by position; steps of integration in a sample
+    logs = []
+    for seed in (1, 2):
+        u, x, v, y = np.repeat(np.random.default_rng(seed).uniform(-6.0, 6.0, 10), 400), 0.0, 0.0, []
+        for voltage in u.tolist():
+            y.append(x)
+            for _ in range(steps):
+                v += 1e-3 / steps * (X["K"] * voltage - pull * x - v) / X["tau"]
+                x += 1e-3 / steps * v
+        t = np.arange(len(u)) * 1e-3
+        logs.append(Log(f"{seed}", t, u, np.round(y, 3), resolution=0.001, closed_loop=False))
+    found = fit(logs[:1], make())
+    said = " ".join(found.unusable())
+    assert "has a spring" in said and "sampled too slowly" not in said
+    verdict = validate(found, logs[1]).verdict
+    assert str(verdict.word) == "not valid", verdict
+    assert not any(reason.kind in ("whiteness", "command") and reason.side == "for" for reason in verdict.reasons)
+
+
 def test_a_lag_that_is_tau_or_delay_is_no_want_of_samples() -> None:
     """Under a triangle, time constant and delay make the same motion: faster samples would not tell them apart."""
     t = np.arange(500) * 0.004

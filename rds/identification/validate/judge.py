@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from math import inf, sqrt
 
 from rds.identification.fit.estimate import said_of_guesses
 from rds.identification.fit.kstep import over_noise
 from rds.identification.validate.assessment import Assessment, largest
 from rds.identification.validate.candidate import Candidate
-from rds.identification.validate.conclusion import conclude, sentence_of
+from rds.identification.validate.conclusion import UNTOLD, conclude, sentence_of
 from rds.identification.validate.judge_data import of_data, of_extent, of_upsets
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
 from rds.identification.validate.within import (
@@ -59,6 +60,8 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands, more: Iterable[Reas
         *more,
     ]
     word, purpose = conclude(a, reasons, bands)
+    if word is Word.NOT:  # what the log leaves open does not matter then
+        reasons = [replace(r, side=Side.NOTE) if r.kind in UNTOLD else r for r in reasons]
     if word is Word.CANNOT_TELL and all(reason.side is not Side.CANNOT_TELL for reason in reasons):
         reasons.append(
             Reason(
