@@ -17,7 +17,7 @@ _LEAST = 20  # blocks; samples of one
 _STEP = 12.0  # robust standard deviations of the steps between blocks, and times the noise
 _OTHER = 3.0  # times the usual size of steps
 _RUN = 4  # blocks of a regime, at least
-_MOST = 0.4  # of the log: a regime is the exception
+_MOST, _TOGETHER = 0.4, 0.25  # of the log: a regime is the exception, and several are so together
 _TOLD = 3  # of each kind
 _WITHIN, _SUDDEN = 4, 0.5  # samples to either side, within which a leap makes so much of its way
 _ALL = 0.8  # of the squares of a model's accelerations
@@ -59,6 +59,8 @@ def upsets(
         for regime in _regimes(size, usual, resolution or 0.0, starts, unit)
         if not _holds_all(modelled[: count * width].reshape(count, width).mean(axis=1), regime, unit)
     ]
+    if len(found) > 1 and sum(end - first for first, end, _ in found) > _TOGETHER * len(steps):
+        found = []  # that is how the model is wrong, not where the log is
     inside = np.zeros(len(steps), dtype=bool)
     for first, end, _ in found:
         inside[first:end] = True
@@ -80,7 +82,7 @@ def _holds_all(modelled: np.ndarray, regime: tuple[int, int, str], unit: str) ->
 
 def _leap(time: np.ndarray, error: np.ndarray, block: int, width: int, unit: str, modelled: np.ndarray) -> str:
     """The sentence on a leap; "" where the error goes there by degrees, as beside a model that is late or too slow, or
-    where a speed is to leap.
+    where a speed is to leap, or changes by so much that a model a few samples late makes the error.
     """
     part = slice(block * width, min((block + 2) * width, len(error)))
     jumps = np.abs(np.diff(error[part]))
@@ -91,6 +93,9 @@ def _leap(time: np.ndarray, error: np.ndarray, block: int, width: int, unit: str
     if abs(float(error[last] - error[first])) < _SUDDEN * abs(size):
         return ""
     if unit in RATES and abs(float(modelled[last] - modelled[first])) > _SUDDEN * abs(size):
+        return ""
+    paces = np.diff(modelled[max(first - _WITHIN, 0) : last + 1])
+    if unit not in RATES and 2 * _WITHIN * float(np.ptp(paces)) > _SUDDEN * abs(size):
         return ""
     return (
         f"at {time[at]:.4g} s the measurement leaps by {size:+.3g} {unit} beside the "
