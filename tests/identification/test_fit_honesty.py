@@ -9,6 +9,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.identification.fit.fit import fit
+from rds.identification.logs import shipped
 from rds.identification.logs.log import Log
 from rds.identification.structures.axis_structure import make
 from rds.identification.structures.structures import structure
@@ -244,13 +245,13 @@ def test_a_slip_of_the_encoder_is_pointed_at_in_time() -> None:
     assert not any("leaps by" in w or "another regime" in w for w in fit([log], make()).warnings)
 
 
-def test_a_delay_that_the_structure_lacks_is_no_slip_and_no_other_regime() -> None:
+def test_what_the_structure_lacks_throughout_is_no_slip_and_no_other_regime() -> None:
     """It was both, at each step of the command, with the advice to leave these stretches out."""
     u = np.repeat(np.random.default_rng(1).uniform(-6.0, 6.0, 25), 400)
     t = np.arange(len(u)) * 1e-3
     y = make(("delay",)).respond(t, u, (0.0, 0.0), X | {"delay": 2.3e-3})
     log = Log("late", t, u, np.round(y, 3), resolution=0.001, closed_loop=False)
-    for part in (log, log.part(0, 6000)):
+    for part in (log, log.part(0, 6000), shipped.log("mini-cnc-X-steps")):  # this one has play and Stribeck friction
         assert not any("leaps by" in w or "another regime" in w for w in fit([part], make()).warnings)
 
 

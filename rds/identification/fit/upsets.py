@@ -17,8 +17,8 @@ _LEAST = 20  # blocks; samples of one
 _STEP = 12.0  # robust standard deviations of the steps between blocks, and times the noise
 _OTHER = 3.0  # times the usual size of steps
 _RUN = 4  # blocks of a regime, at least
-_MOST, _TOGETHER = 0.4, 0.25  # of the log: a regime is the exception, and several are so together
-_TOLD = 3  # of each kind
+_MOST, _TOGETHER = 0.4, 0.25  # of the log: a regime is the exception, and so are both together, where there are two
+_TOLD = 3  # leaps
 _WITHIN, _SUDDEN = 4, 0.5  # samples to either side, within which a leap makes so much of its way
 _ALL = 0.8  # of the squares of a model's accelerations
 
@@ -59,7 +59,7 @@ def upsets(
         for regime in _regimes(size, usual, resolution or 0.0, starts, unit)
         if not _holds_all(modelled[: count * width].reshape(count, width).mean(axis=1), regime, unit)
     ]
-    if len(found) > 1 and sum(end - first for first, end, _ in found) > _TOGETHER * len(steps):
+    if len(found) > 2 or (len(found) == 2 and sum(end - first for first, end, _ in found) > _TOGETHER * len(steps)):
         found = []  # that is how the model is wrong, not where the log is
     inside = np.zeros(len(steps), dtype=bool)
     for first, end, _ in found:
@@ -69,7 +69,7 @@ def upsets(
     leaps = leaps[np.diff(leaps, prepend=-9) > 1]  # a step in a block's middle counts once
     told = [_leap(time, error, int(k), width, unit, modelled) for k in leaps] if len(leaps) <= count // 20 else []
     said = [sentence + late for sentence in told if sentence][:_TOLD]
-    return [*said, *(sentence for _, _, sentence in found[:_TOLD])]
+    return [*said, *(sentence for _, _, sentence in found)]
 
 
 def _holds_all(modelled: np.ndarray, regime: tuple[int, int, str], unit: str) -> bool:
@@ -124,9 +124,10 @@ def _regimes(
         where = first + np.flatnonzero(large)
         begin, stop = float(starts[where[0]]), float(starts[min(where[-1] + 1, len(starts) - 1)])
         what = (
-            f"from {begin:.4g} to {stop:.4g} s the log is of another regime: there, measured minus modelled changes "
-            f"{float(np.median(size[where])) / usual:.2g} times as much as elsewhere ({unit}); leave that stretch out, "
-            "or find what was different (load, friction, a drive that was off)"
+            f"from {begin:.4g} to {stop:.4g} s the log may be of another regime: there, measured minus modelled "
+            f"changes {float(np.median(size[where])) / usual:.2g} times as much as elsewhere ({unit}). Find what was "
+            "different (load, friction, a drive that was off; speeds at which the structure lacks something) before "
+            "you leave that stretch out"
         )
         found.append((int(where[0]), int(where[-1]) + 1, what))
     return found
