@@ -72,7 +72,8 @@ def made_estimate(
                 f"{name}: {value:.3g} {unit} with a standard error of {error:.3g} {unit} is poorly determined by these "
                 "data"
             )
-    notes += dict.fromkeys(f.what for log in logs for f in log.findings if f.kind == UNKNOWN)
+    if not given:  # a constant that was held beside the log is one that is known
+        notes += dict.fromkeys(f.what for log in logs for f in log.findings if f.kind == UNKNOWN)
     begun, free_run, predictions = {}, {}, {}
     runs = [_run(structure, log, values, state) for log, state in zip(logs, states or [None] * len(logs), strict=True)]
     off = max(over_noise_of(log, log.position - run) for log, (_, run) in zip(logs, runs, strict=True))
