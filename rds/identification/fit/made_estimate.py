@@ -75,8 +75,10 @@ def made_estimate(
     if not given:  # a constant that was held beside the log is one that is known
         notes += dict.fromkeys(f.what for log in logs for f in log.findings if f.kind == UNKNOWN)
     begun, free_run, predictions = {}, {}, {}
-    runs = [_run(structure, log, values, state) for log, state in zip(logs, states or [None] * len(logs), strict=True)]
-    off = max(over_noise_of(log, log.position - run) for log, (_, run) in zip(logs, runs, strict=True))
+    starts: Sequence[tuple[float, ...] | None] = [None] * len(logs) if states is None else states
+    runs = [_run(structure, log, values, state) for log, state in zip(logs, starts, strict=True)]
+    with np.errstate(all="ignore"):
+        off = max(over_noise_of(log, log.position - run) for log, (_, run) in zip(logs, runs, strict=True))
     said = _of_logs(logs)
     said += [*said_of_guesses(parameters), *_too_slow(logs, parameters, covariance, method, off), *warnings]
     if _none_told(parameters) and not any(UNUSABLE in sentence for sentence in said):
@@ -85,7 +87,7 @@ def made_estimate(
             "end); record more motion, at other commands (`rds excite`)"
         )
     for number, log in enumerate(logs):
-        state = None if states is None else states[number]
+        state = starts[number]
         begun[log.name], modelled = runs[number]
         free_run[log.name], predictions[log.name] = _errors(structure, log, values, modelled)
         if judged and states is None and not log.closed_loop:
