@@ -84,6 +84,7 @@ def test_the_motor_constant_is_given_or_follows_from_torque_and_current() -> Non
     assert any("known as ratios to that constant only" in sentence for sentence in ratios.unidentifiable)
     held = fit([current], structure("axis-inertia"), "simulation", {"fixed": {"torque_gain": K_T}})
     assert held.values()["J"] == pytest.approx(TURNS["J"], rel=0.01) and held.values()["torque_gain"] == K_T
+    assert not any("known as ratios" in sentence for sentence in held.unidentifiable)
     with pytest.raises(InputError, match=r"torque_gain is given with the log \(0.4 Nm/A\) and cannot be held"):
         fit([known], structure("axis-inertia"), "simulation", {"fixed": {"torque_gain": 0.5}})
     torque = K_T * current.command + 0.005 * np.random.default_rng(0).standard_normal(len(current)) + 0.01

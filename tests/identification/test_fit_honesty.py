@@ -9,6 +9,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.identification.fit.fit import fit
+from rds.identification.logs import shipped
 from rds.identification.logs.log import Log
 from rds.identification.structures.axis_structure import make
 from rds.identification.structures.structures import structure
@@ -196,6 +197,27 @@ def test_a_log_sampled_too_slowly_gives_no_model_and_says_which_period_would_do(
     assert "in seconds" not in " ".join(found.warnings)
 
 
+def test_an_axis_on_a_spring_is_no_want_of_samples_and_its_model_is_not_valid() -> None:
+    """The fit puts tau at 0, where it is ten samples: no faster sampling would help."""
+    pull, steps = 5.0, 5  # 1/s, speed by position; steps of integration in a sample
+    logs = []
+    for seed in (1, 2):
+        u, x, v, y = np.repeat(np.random.default_rng(seed).uniform(-6.0, 6.0, 10), 400), 0.0, 0.0, []
+        for voltage in u.tolist():
+            y.append(x)
+            for _ in range(steps):
+                v += 1e-3 / steps * (X["K"] * voltage - pull * x - v) / X["tau"]
+                x += 1e-3 / steps * v
+        t = np.arange(len(u)) * 1e-3
+        logs.append(Log(f"{seed}", t, u, np.round(y, 3), resolution=0.001, closed_loop=False))
+    found = fit(logs[:1], make())
+    said = " ".join(found.unusable())
+    assert "has a spring" in said and "sampled too slowly" not in said
+    verdict = validate(found, logs[1]).verdict
+    assert str(verdict.word) == "not valid", verdict
+    assert not any(reason.kind in ("whiteness", "command") and reason.side == "for" for reason in verdict.reasons)
+
+
 def test_a_lag_that_is_tau_or_delay_is_no_want_of_samples() -> None:
     """Under a triangle, time constant and delay make the same motion: faster samples would not tell them apart."""
     t = np.arange(500) * 0.004
@@ -221,6 +243,16 @@ def test_a_slip_of_the_encoder_is_pointed_at_in_time() -> None:
     (said,) = [w for w in fit([slipped], make()).warnings if "leaps by" in w]
     assert "at 2.345 s the measurement leaps by +0.0" in said
     assert not any("leaps by" in w or "another regime" in w for w in fit([log], make()).warnings)
+
+
+def test_what_the_structure_lacks_throughout_is_no_slip_and_no_other_regime() -> None:
+    """It was both, at each step of the command, with the advice to leave these stretches out."""
+    u = np.repeat(np.random.default_rng(1).uniform(-6.0, 6.0, 25), 400)
+    t = np.arange(len(u)) * 1e-3
+    y = make(("delay",)).respond(t, u, (0.0, 0.0), X | {"delay": 2.3e-3})
+    log = Log("late", t, u, np.round(y, 3), resolution=0.001, closed_loop=False)
+    for part in (log, log.part(0, 6000), shipped.log("mini-cnc-X-steps")):  # this one has play and Stribeck friction
+        assert not any("leaps by" in w or "another regime" in w for w in fit([part], make()).warnings)
 
 
 def test_a_fit_s_free_run_is_measured_as_a_validation_measures_it() -> None:

@@ -41,6 +41,13 @@ def test_the_option_that_is_missing_is_named(added: dict[str, float]) -> None:
     assert missing_option(fit([log], structure("axis", [name])), [log]) is None  # nothing is left to be explained
 
 
+def test_a_command_that_was_logged_after_it_acted_is_named() -> None:
+    log = moved()
+    late = replace(log, command=np.concatenate([np.zeros(5), log.command[:-5]]))
+    hint = missing_option(fit([late], structure("axis")), [late])
+    assert hint is not None and hint.startswith("the command comes too late in this log, by about 5 ms"), hint
+
+
 def test_several_things_are_named_one_after_the_other() -> None:
     """The Z axis of the mini CNC has Stribeck friction and play."""
     log = shipped.log("mini-cnc-Z-steps").part(0, 2000)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _POOR = 90.0  # per cent: a model that fits worse does not explain the motion
 MISSED = 1.5  # times the measurement's noise: residuals that are larger hold something else
 _LEAP = 0.05  # of the highest speed: by how much a fitted initial velocity may leave those that the log shows
-_FAR = 10.0  # times what noise makes of a prediction: it is off by more than noise and intervals explain
+FAR = 10.0  # times what noise makes of a prediction: it is off by more than noise and intervals explain
 _LITTLE = 100.0  # times the measurement's noise: with less motion than that, a fit is not told by much
 _NONE = 12.0  # times the noise: it alone spans 8 in 10^4 samples, 10.4 in 10^7
 _WHITE = 2.576  # 99 % band, in units of 1/√N
@@ -91,7 +91,7 @@ def leap_doubts(
 def held_doubts(structure: Structure, log: Log, predicted: Mapping[int, Errors]) -> list[str]:
     """Doubts where a controller held the axis, whose absence a short prediction does not show."""
     found = over_noise(predicted, motion_of(log).noise)
-    if found is None or found[1] <= _FAR:
+    if found is None or found[1] <= FAR:
         return []
     k, ratio = found
     return [
@@ -99,6 +99,12 @@ def held_doubts(structure: Structure, log: Log, predicted: Mapping[int, Errors])
         f"{ratio:.3g} times what the measurement's noise makes: the machine does something that structure "
         f"{_named(structure)} lacks (a delay, play, ...), or the parameters are off; no interval counts that"
     ]
+
+
+def over_noise_of(log: Log, error: np.ndarray) -> float:
+    """How many times the measurement's noise the `error` (samples,) is, RMS; 0 of a log without noise."""
+    noise = motion_of(log).noise
+    return _rms(error) / noise if noise > 0.0 else 0.0
 
 
 def is_little(structure: Structure, log: Log) -> bool:

@@ -5,8 +5,9 @@ Butterworth filter of order 4, which shifts no phase; velocity and acceleration 
 at both ends are left out; voltage (or force) and every column of the equation are filtered and decimated alike, so that
 what the filters take from one side they take from the other. `MotionForm` says which equation.
 
-Two things are ours. Samples at which the axis stands still are left out, since at rest friction answers any
-voltage. And the residuals' correlation counts in the standard errors (`regression.py`).
+Three things are ours. Samples at which the axis stands still are left out, since at rest friction answers any
+voltage. The residuals' correlation counts in the standard errors (`regression.py`). And a log at irregular times, as
+robots and networks stamp them, is taken at equal steps first, which filter and differences need.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from rds.core.quantities import Quantity
 from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.made_estimate import made_estimate
 from rds.identification.fit.regression import Regression, regress
-from rds.identification.logs.log import Log, check_regular
+from rds.identification.logs.log import Log, irregular_at
 from rds.identification.structures.motion_form import MotionForm, motion_form
 from rds.identification.structures.structure import Structure
 
@@ -48,6 +49,7 @@ OPTIONS = {
 }
 _REST = 2  # decimated samples within which an axis at rest moves no more than one step of its encoder
 _LEAST = 5  # rows for each coefficient
+_BRIDGED = 3.0  # sample periods: a longer step is a gap, within which the motion is not known
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,7 @@ class Found:
     held: tuple[str, ...]  # friction that came out with the wrong sign, and was held at zero
     absent: tuple[str, ...] = ()  # what no row holds
     fixed: tuple[str, ...] = ()
+    stepped: tuple[str, ...] = ()  # logs at irregular times, which were taken at equal steps
 
 
 def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Estimate:
@@ -132,6 +135,7 @@ def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str
     """The regression alone, over all logs together."""
     form = motion_form(structure)
     fixed = _fixed(options.get(FIXED) or {}, form, structure)
+    stepped = tuple(log.name for log in logs if irregular_at(log) is not None)
     settings = _settings(logs, structure, {name: value for name, value in options.items() if name != FIXED})
     gain = next(iter(structure.given(logs).values())) if structure.given else 1.0
     blocks, still = [], 0
@@ -169,6 +173,7 @@ def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str
         held=tuple(form.names[column] for column in held),
         absent=tuple(name for name, column in zip(form.names, table[:, 1:].T, strict=True) if not column.any()),
         fixed=tuple(fixed),
+        stepped=stepped,
     )
 
 
@@ -224,13 +229,40 @@ def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, A
     )
 
 
+def _regular(log: Log, is_held: bool) -> Log:
+    """The log itself, or at equal steps, the mean ones, where its times are not: the position by a cubic spline.
+
+    Of a held command each step gets its mean, since a change falls between two steps; another one is taken on straight
+    lines. InputError for a gap: no spline knows the motion in it.
+    """
+    if irregular_at(log) is None:
+        return log
+    with needed_for("a fit by inverse dynamics"):
+        from scipy.interpolate import CubicSpline
+
+    steps = np.diff(log.time) / log.sample_period
+    if steps.max() > _BRIDGED:
+        at = int(np.argmax(steps > _BRIDGED))
+        raise InputError(
+            f"{steps[at]:.3g} sample periods are between {log.time[at]:g} and {log.time[at + 1]:g} s, a gap that no "
+            'filter bridges; gaps = "split" in the map makes a log of each stretch (in Python: log.part(first, end))',
+            log.source or log.name,
+        )
+    grid = np.linspace(log.time[0], log.time[-1], len(log))
+    command = np.interp(grid, log.time, log.command)
+    if is_held:
+        so_far = np.concatenate([[0.0], np.cumsum(log.command[:-1] * np.diff(log.time))])
+        command[:-1] = np.diff(np.interp(grid, log.time, so_far)) / (grid[1] - grid[0])
+    return replace(log, time=grid, command=command, position=CubicSpline(log.time, log.position)(grid), extra={})
+
+
 def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[np.ndarray, np.ndarray]:
     """The target and the columns of one log, decimated, (rows, 1 + coefficients); and which rows are at rest."""
     with needed_for("a fit by inverse dynamics"):
         from scipy.signal import butter, decimate, filtfilt
 
+    log = _regular(log, settings.hold > 0.0)
     T = log.sample_period
-    check_regular(log, "a filter")
     least = 2 * settings.drop + 4 * settings.decimation * len(form.names)
     if len(log) < max(least, 40):
         raise InputError(
@@ -332,6 +364,11 @@ def _warnings(found: Found) -> list[str]:
         said.append(
             f"{', '.join(found.held)} came out driving the axis, not braking it, and was held at 0: friction is too "
             "small for these data to tell, the form is wrong, or the sign of the command is reversed"
+        )
+    if found.stepped:
+        said.append(
+            f"{', '.join(found.stepped)}: the times are irregular, and derivatives need equal steps: the position was "
+            "taken at such steps by a spline"
         )
     if found.form.gain is not None and found.values["K"] < 0.0:
         said.append(

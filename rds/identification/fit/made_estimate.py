@@ -13,7 +13,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, names_of, said_of_guesses
-from rds.identification.fit.free_run_doubts import held_doubts, leap_doubts, other_doubts
+from rds.identification.fit.free_run_doubts import FAR, held_doubts, leap_doubts, other_doubts, over_noise_of
 from rds.identification.fit.initial_state import estimate_start, initial_samples
 from rds.identification.fit.kstep import ahead, errors_of
 from rds.identification.fit.smoothing import speed_range
@@ -72,18 +72,23 @@ def made_estimate(
                 f"{name}: {value:.3g} {unit} with a standard error of {error:.3g} {unit} is poorly determined by these "
                 "data"
             )
-    notes += dict.fromkeys(f.what for log in logs for f in log.findings if f.kind == UNKNOWN)
+    if not given:  # a constant that was held beside the log is one that is known
+        notes += dict.fromkeys(f.what for log in logs for f in log.findings if f.kind == UNKNOWN)
     begun, free_run, predictions = {}, {}, {}
+    starts: Sequence[tuple[float, ...] | None] = [None] * len(logs) if states is None else states
+    runs = [_run(structure, log, values, state) for log, state in zip(logs, starts, strict=True)]
+    with np.errstate(all="ignore"):
+        off = max(over_noise_of(log, log.position - run) for log, (_, run) in zip(logs, runs, strict=True))
     said = _of_logs(logs)
-    said += [*said_of_guesses(parameters), *_too_slow(logs, parameters, covariance, method), *warnings]
+    said += [*said_of_guesses(parameters), *_too_slow(logs, parameters, covariance, method, off), *warnings]
     if _none_told(parameters) and not any(UNUSABLE in sentence for sentence in said):
         said.append(
             f"{UNUSABLE}: not one of them is told by these data (every interval is wider than its value, or has no "
             "end); record more motion, at other commands (`rds excite`)"
         )
     for number, log in enumerate(logs):
-        state = None if states is None else states[number]
-        begun[log.name], modelled = _run(structure, log, values, state)
+        state = starts[number]
+        begun[log.name], modelled = runs[number]
         free_run[log.name], predictions[log.name] = _errors(structure, log, values, modelled)
         if judged and states is None and not log.closed_loop:
             said += other_doubts(structure, log, log.position - modelled, method)
@@ -135,10 +140,10 @@ def _of_logs(logs: Sequence[Log]) -> list[str]:
 
 
 def _too_slow(
-    logs: Sequence[Log], parameters: Mapping[str, Parameter], covariance: np.ndarray, method: str
+    logs: Sequence[Log], parameters: Mapping[str, Parameter], covariance: np.ndarray, method: str, off: float
 ) -> list[str]:
     """A sentence where the samples are too far apart for the time constant, with the period that would do; or where a
-    delay makes up for it.
+    delay makes up for it, or the time constant for another structure: the free run is `off` by so many times the noise.
 
     Not of inverse dynamics: derivatives of coarse or noisy positions make its time constants short, whatever they are.
     """
@@ -164,6 +169,13 @@ def _too_slow(
                 "neither of them: a command that changes slowly makes the same motion with either. Log steps of the "
                 "command, or hold one of them (--fix delay=0)"
             ]
+    if off > FAR:
+        return [
+            f"{UNUSABLE}: tau came out within {_PERIODS:g} sample periods, at {1e3 * made.value:.3g} ms, and the free "
+            f"run is {off:.3g} times the noise off. Either the structure is not how this machine moves, and tau makes "
+            "up for it (no structure here has a spring, or a position that the command asks for), or within a sample "
+            "the axis is at its speed. Try other options and structures before you sample faster"
+        ]
     return [
         f"{UNUSABLE}: sampled too slowly. Within a sample period of {1e3 * period:.3g} ms the axis is at its speed: "
         f"the log tells that tau is below {1e3 * most:.3g} ms, and no more. A period of {1e3 * _ROUND * most:.2g} ms "

@@ -27,6 +27,7 @@ _LESS = 0.7  # of the residuals: an option that leaves more does not explain the
 _MOST = 0.5  # of the residuals: a first search that leaves less needs no second
 _GLIMPSE = 0.02  # of what an option begins with: hardly any effect, but a derivative
 _FEW = 20  # samples of a log
+_SHIFTS = (1, 2, 3, 5, 8)  # samples by which a command may have been logged late
 _UNTELLABLE = ("viscous",)  # no data tell it beside the others
 
 
@@ -68,6 +69,13 @@ def missing_option(estimate: Estimate, logs: Sequence[Log]) -> str | None:
         if left is not None and left < _LESS * least:
             found[option] = left
     unit = next(iter(estimate.free_run.values())).unit
+    if not found and "delay" in others and (late := _late_command(parts, estimate, signals, least)) is not None:
+        seconds, left = late
+        return (
+            f"the command comes too late in this log, by about {1e3 * seconds:.3g} ms: taken so much earlier, it would "
+            f"leave {left:.2g} {unit} in place of {least:.2g} {unit}. Was it stamped, or written to its row, after it "
+            "acted?"
+        )
     if not found:
         return (
             f"a short search found none of the other options of structure {estimate.structure} ({', '.join(others)}) "
@@ -81,6 +89,22 @@ def missing_option(estimate: Estimate, logs: Sequence[Log]) -> str | None:
         f"{found[ranked[0]]:.2g} {unit} in place of {least:.2g} {unit}"
         + (f" (by itself each: {said})" if len(ranked) > 1 else "")
     )
+
+
+def _late_command(
+    logs: Sequence[Log], estimate: Estimate, signals: tuple[str, str], least: float
+) -> tuple[float, float] | None:
+    """By how much earlier (s) a command explains the motion best, and what that leaves; None if it is not much less.
+
+    No structure has a delay below 0.
+    """
+    own, found = structure(estimate.structure, estimate.options, *signals), {}
+    for samples in _SHIFTS:
+        shifted = [replace(log.part(0, len(log) - samples), command=log.command[samples:]) for log in logs]
+        left = _left(shifted, own, estimate)
+        if left is not None and left < _MOST * least:
+            found[samples * logs[0].sample_period] = left
+    return min(found.items(), key=lambda item: item[1]) if found else None
 
 
 def _left(logs: Sequence[Log], wider: Structure, estimate: Estimate, least: float | None = None) -> float | None:

@@ -17,8 +17,8 @@ _LEAST = 20  # blocks; samples of one
 _STEP = 12.0  # robust standard deviations of the steps between blocks, and times the noise
 _OTHER = 3.0  # times the usual size of steps
 _RUN = 4  # blocks of a regime, at least
-_MOST = 0.4  # of the log: a regime is the exception
-_TOLD = 3  # of each kind
+_MOST, _TOGETHER = 0.4, 0.25  # of the log: a regime is the exception, and so are both together, where there are two
+_TOLD = 3  # leaps
 _WITHIN, _SUDDEN = 4, 0.5  # samples to either side, within which a leap makes so much of its way
 _ALL = 0.8  # of the squares of a model's accelerations
 
@@ -59,6 +59,8 @@ def upsets(
         for regime in _regimes(size, usual, resolution or 0.0, starts, unit)
         if not _holds_all(modelled[: count * width].reshape(count, width).mean(axis=1), regime, unit)
     ]
+    if len(found) > 2 or (len(found) == 2 and sum(end - first for first, end, _ in found) > _TOGETHER * len(steps)):
+        found = []  # that is how the model is wrong, not where the log is
     inside = np.zeros(len(steps), dtype=bool)
     for first, end, _ in found:
         inside[first:end] = True
@@ -67,7 +69,7 @@ def upsets(
     leaps = leaps[np.diff(leaps, prepend=-9) > 1]  # a step in a block's middle counts once
     told = [_leap(time, error, int(k), width, unit, modelled) for k in leaps] if len(leaps) <= count // 20 else []
     said = [sentence + late for sentence in told if sentence][:_TOLD]
-    return [*said, *(sentence for _, _, sentence in found[:_TOLD])]
+    return [*said, *(sentence for _, _, sentence in found)]
 
 
 def _holds_all(modelled: np.ndarray, regime: tuple[int, int, str], unit: str) -> bool:
@@ -80,7 +82,7 @@ def _holds_all(modelled: np.ndarray, regime: tuple[int, int, str], unit: str) ->
 
 def _leap(time: np.ndarray, error: np.ndarray, block: int, width: int, unit: str, modelled: np.ndarray) -> str:
     """The sentence on a leap; "" where the error goes there by degrees, as beside a model that is late or too slow, or
-    where a speed is to leap.
+    where a speed is to leap, or changes by so much that a model a few samples late makes the error.
     """
     part = slice(block * width, min((block + 2) * width, len(error)))
     jumps = np.abs(np.diff(error[part]))
@@ -91,6 +93,9 @@ def _leap(time: np.ndarray, error: np.ndarray, block: int, width: int, unit: str
     if abs(float(error[last] - error[first])) < _SUDDEN * abs(size):
         return ""
     if unit in RATES and abs(float(modelled[last] - modelled[first])) > _SUDDEN * abs(size):
+        return ""
+    paces = np.diff(modelled[max(first - _WITHIN, 0) : last + 1])
+    if unit not in RATES and 2 * _WITHIN * float(np.ptp(paces)) > _SUDDEN * abs(size):
         return ""
     return (
         f"at {time[at]:.4g} s the measurement leaps by {size:+.3g} {unit} beside the "
@@ -119,9 +124,10 @@ def _regimes(
         where = first + np.flatnonzero(large)
         begin, stop = float(starts[where[0]]), float(starts[min(where[-1] + 1, len(starts) - 1)])
         what = (
-            f"from {begin:.4g} to {stop:.4g} s the log is of another regime: there, measured minus modelled changes "
-            f"{float(np.median(size[where])) / usual:.2g} times as much as elsewhere ({unit}); leave that stretch out, "
-            "or find what was different (load, friction, a drive that was off)"
+            f"from {begin:.4g} to {stop:.4g} s the log may be of another regime: there, measured minus modelled "
+            f"changes {float(np.median(size[where])) / usual:.2g} times as much as elsewhere ({unit}). Find what was "
+            "different (load, friction, a drive that was off; speeds at which the structure lacks something) before "
+            "you leave that stretch out"
         )
         found.append((int(where[0]), int(where[-1]) + 1, what))
     return found

@@ -156,14 +156,24 @@ class Log:
         )
 
 
-def check_regular(log: Log, what: str) -> None:
-    """InputError where a time is more than a tenth of a sample period off a regular grid, which `what` needs."""
+def irregular_at(log: Log) -> tuple[int, float] | None:
+    """The first sample whose time is more than a tenth of a sample period off a regular grid, and by how many periods;
+    None of a regular log.
+    """
     T = log.sample_period
     off = np.abs(log.time - log.time[0] - T * np.arange(len(log))) / T
-    if off.max() > _JITTER:
-        at = int(np.argmax(off > _JITTER))
+    if off.max() <= _JITTER:
+        return None
+    at = int(np.argmax(off > _JITTER))
+    return at, float(off[at])
+
+
+def check_regular(log: Log, what: str) -> None:
+    """InputError where the times are irregular (`irregular_at`), and `what` needs a regular grid."""
+    if (found := irregular_at(log)) is not None:
+        at, off = found
         raise InputError(
-            f"at sample {at}, t = {log.time[at]:g} s is {off[at]:.2g} sample periods off a regular grid, which {what} "
+            f"at sample {at}, t = {log.time[at]:g} s is {off:.2g} sample periods off a regular grid, which {what} "
             "needs; take --method simulation, which uses times as they are, or resample the log",
             log.source or log.name,
         )

@@ -11,17 +11,27 @@ from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Wo
 from rds.identification.validate.within import foreseen_at, frequency_told, passes
 
 WRONG = frozenset({"gain", "phase", "delay", "friction", "speed", "loop"})  # what a loop would feel, or does
+UNTOLD = frozenset({"gain-unidentifiable", "speed-unidentifiable", "phase-unidentifiable"})
 DATA = "data-"  # how the kind of a reason begins that is a finding about the log
 
 
 def conclude(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
     """The word of the verdict, and what the model is valid for where that is only something."""
     cannot_tell = {reason.kind for reason in reasons if reason.side is Side.CANNOT_TELL}
-    if any(kind != "same-data" and not kind.startswith(DATA) for kind in cannot_tell):
+    decisive = {kind for kind in cannot_tell if kind != "same-data" and not kind.startswith(DATA)}
+    if decisive and not (decisive <= UNTOLD and _fails(a, reasons, bands)):
         return Word.CANNOT_TELL, ""
     word, purpose = _from_errors(a, reasons, bands)
     # what fails even on its own data, or on faulty ones, has failed; what passes there has shown nothing
     return (Word.CANNOT_TELL, "") if cannot_tell and word is not Word.NOT else (word, purpose)
+
+
+def _fails(a: Assessment, reasons: list[Reason], bands: Bands) -> bool:
+    """Whether the model moves otherwise than the axis in all respects, whatever its gain is: no controller had a part
+    in it, and neither free run, voltage nor predictions are right.
+    """
+    against = {reason.kind for reason in reasons if reason.side is Side.AGAINST}
+    return a.log.closed_loop is False and not any(passes(a, bands)) and {"voltage", "ahead"} <= against
 
 
 def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from math import inf, sqrt
 
 from rds.identification.fit.estimate import said_of_guesses
 from rds.identification.fit.kstep import over_noise
 from rds.identification.validate.assessment import Assessment, largest
 from rds.identification.validate.candidate import Candidate
-from rds.identification.validate.conclusion import conclude, sentence_of
+from rds.identification.validate.conclusion import UNTOLD, conclude, sentence_of
 from rds.identification.validate.judge_data import of_data, of_extent, of_upsets
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
 from rds.identification.validate.within import (
@@ -59,6 +60,8 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands, more: Iterable[Reas
         *more,
     ]
     word, purpose = conclude(a, reasons, bands)
+    if word is Word.NOT:  # what the log leaves open does not matter then
+        reasons = [replace(r, side=Side.NOTE) if r.kind in UNTOLD else r for r in reasons]
     if word is Word.CANNOT_TELL and all(reason.side is not Side.CANNOT_TELL for reason in reasons):
         reasons.append(
             Reason(
@@ -243,15 +246,14 @@ def _residuals(a: Assessment, bands: Bands) -> Iterator[Reason]:
         f"autocorrelation {r:.2f} after {lag:.3g} s"
     )
     against = Side.NOTE if slight(a, bands) else Side.AGAINST
+    # wide intervals allow for any residual: of a model that fails, that says nothing for it
+    allowed = Side.FOR if all(passes(a, bands)) else Side.NOTE
+    make_it = "the encoder's rounding and the uncertainty of the parameters make it"
     if tests.p_white <= bands.significance:
         yield Reason(against, "whiteness", f"the residual is not white ({numbers})")
     elif tests.auto.outside > _FEW:
-        yield Reason(
-            Side.FOR,
-            "whiteness",
-            "the residual is not white, but no less so than the encoder's rounding and the uncertainty of the "
-            f"parameters make it ({numbers})",
-        )
+        text = f"the residual is not white, but no less so than {make_it} ({numbers})"
+        yield Reason(allowed, "whiteness", text)
     else:
         yield Reason(Side.FOR, "whiteness", f"the residual is white ({numbers})")
     if a.log.closed_loop:
@@ -262,14 +264,15 @@ def _residuals(a: Assessment, bands: Bands) -> Iterator[Reason]:
             "proves nothing either way",
         )
         return
-    free = tests.p_command > bands.significance
     c, lag = tests.cross.largest
-    yield Reason(
-        Side.FOR if free else against,
-        "command",
-        f"the residual is {'independent of' if free else 'correlated with'} the command "
-        f"(p = {tests.p_command:.3f}; largest correlation {c:.2f} at {lag:.3g} s)",
-    )
+    numbers = f"p = {tests.p_command:.3f}; largest correlation {c:.2f} at {lag:.3g} s"
+    if tests.p_command <= bands.significance:
+        yield Reason(against, "command", f"the residual is correlated with the command ({numbers})")
+    elif tests.cross.outside > _FEW:
+        text = f"the residual is correlated with the command, but no more so than {make_it} ({numbers})"
+        yield Reason(allowed, "command", text)
+    else:
+        yield Reason(Side.FOR, "command", f"the residual is independent of the command ({numbers})")
 
 
 def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
