@@ -32,6 +32,7 @@ KINDS = Registry(
         "return-error": "rds.results.reports.return_error",
         "unsynchronized-rapids": "rds.results.reports.unsynchronized_rapids",
         "path-error": "rds.results.reports.path_error",
+        "circular": "rds.results.reports.circular",
     },
     own=False,
 )
