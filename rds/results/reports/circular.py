@@ -228,7 +228,9 @@ class CircularTest:
         step = next(power * each for each in (0.5, 1.0, 2.0, 5.0) if 2.5 * power * each >= largest)
         axes.set_rlim(-7.5 * step, 3 * step)  # the reference circle is 7.5 steps in radius
         ticks = step * np.arange(-3, 4)
-        axes.set_rgrids(ticks, [f"{tick:+g} µm" if tick else "0" for tick in ticks], angle=22.5, fontsize="x-small")
+        axes.set_rgrids(ticks, [f"{tick:+g} µm" if tick else "0" for tick in ticks], angle=67.5, fontsize="x-small")
+        for label in axes.get_yticklabels():
+            label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6})
         names = {0: f"+{self.axes[0]}", 90: f"+{self.axes[1]}", 180: f"-{self.axes[0]}", 270: f"-{self.axes[1]}"}
         axes.set_thetagrids(range(0, 360, 45), [names.get(at, f"{at}°") for at in range(0, 360, 45)])
         axes.set_xlabel(f"{self.name}: radial deviation [µm], magnified {1e3 * self.radius / (7.5 * step):.3g} times")
