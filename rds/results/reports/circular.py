@@ -62,10 +62,8 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
             "Causes",
             ("run", "cause", "axis", "value", "unit", "recognized by"),
             [[test.name, *cause] for test in tests for cause in test.causes],
-            "; ".join(
-                f"{test.name}: what is below {test.level:.2g} µm is a step or noise of the readings, or 1 % of G"
-                for test in tests
-            ),
+            "Below this it is a step or noise of the readings, what the causes leave, or 1 % of G: "
+            + ", ".join(f"{test.name} {test.level:.2g} µm" for test in tests),
         ),
         Table(
             "Spikes after reversals",
@@ -137,7 +135,8 @@ class CircularTest:
             weight[(np.abs(left) > max(usual, 0.2 * self.level)) & (k > 30)] = 0.0
         rest = np.full(len(off), np.nan)
         rest[there] = left
-        self.spikes = self._spikes(rest.reshape(-1, _CELLS), int(reach * _CELLS / 360), max(self.level, usual), play)
+        self.level = max(self.level, usual)
+        self.spikes = self._spikes(rest.reshape(-1, _CELLS), int(reach * _CELLS / 360), play)
         S, Q, M = (float(value) for value in found[3 * len(self.arcs) :][:3])
         (one, other), R, v = self.axes, self.radius, self.feed
         at_45 = "an ellipse at 45°, the same in both directions; positive: less than 90° between the axes"
@@ -159,7 +158,7 @@ class CircularTest:
                 said = f"peaks {after:.1f}° after the quadrant, mean of {len(of)}: friction at the reversal"
                 every.append((np.inf, ["reversal spike", name, height, "µm", said]))
         if self.known:
-            mean = self.rows[-1][4]
+            mean = float(found[: 3 * len(self.arcs) : 3].mean())  # without steps and spikes
             every.append((mean, ["radius error", f"{one}, {other}", mean, "µm", self._lag_said()]))
         self.causes = [row for amount, row in every if abs(amount) > self.level]
 
@@ -172,7 +171,7 @@ class CircularTest:
             f"would make it {shrinks:.2f} µm: R/sqrt(1 + (ωT)²) - R, about -(vT)²/2R"
         )
 
-    def _spikes(self, rest: np.ndarray, cells: int, doubt: float, play: Sequence[float]) -> list[list[Any]]:
+    def _spikes(self, rest: np.ndarray, cells: int, play: Sequence[float]) -> list[list[Any]]:
         """The largest of what is left once play is taken up; inward it may be the soft end of a step, which is none."""
         rows = []
         for arc, left in zip(self.arcs, rest, strict=True):
@@ -181,7 +180,7 @@ class CircularTest:
                 after = left[(first + np.arange(cells) if arc.sense > 0 else first - 1 - np.arange(cells)) % _CELLS]
                 ends = np.arccos(max(1 - 1e-3 * abs(play[quadrant % 2]) / self.radius, 0.0)) * _CELLS / (2 * pi)
                 after[: int(np.ceil(ends))] = 0.0
-                after = np.where((after > doubt) | (after < -doubt - abs(play[quadrant % 2]) / 2), after, 0.0)
+                after = np.where((after > self.level) | (after < -self.level - abs(play[quadrant % 2]) / 2), after, 0.0)
                 peak = int(np.argmax(np.abs(after)))
                 if after[peak]:
                     place = (peak + 0.5) * 360 / _CELLS
