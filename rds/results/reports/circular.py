@@ -39,8 +39,19 @@ _SENSES = {1: "counter-clockwise", -1: "clockwise"}
 _CELLS = 720  # of a turn
 _NOISE = 3.0  # standard deviations of the readings: what is smaller is no cause
 _SHARE, _LEAST = 0.01, 0.05  # of G, which the terms, of first order, do not tell; µm
-_HEADS = ("run", "direction", "steady [deg]", "radius [mm]", "feed [mm/min]", "mean radius error [µm]")
-_HEADS += ("centre, 1st axis [µm]", "centre, 2nd axis [µm]", "G [µm]", "F max [µm]", "F min [µm]")
+_HEADS = (
+    "run",
+    "direction",
+    "steady [deg]",
+    "radius [mm]",
+    "feed [mm/min]",
+    "mean radius error [µm]",
+    "centre, 1st axis [µm]",
+    "centre, 2nd axis [µm]",
+    "G [µm]",
+    "F max [µm]",
+    "F min [µm]",
+)
 
 
 def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
