@@ -52,6 +52,14 @@ def plate_left(folder: Path) -> Path:
     return folder / "plate-cut.png"
 
 
+def circular_test(folder: Path) -> Path:
+    """The circular test in docs/part-programs.md."""
+    _rds(folder, "nc", "bundled", "circular_test")
+    _rds(folder, "nc", "run", "circular_test.ngc", "--controller", "pid", "--out", "pid")
+    _rds(folder, "report", "circular", "pid", "--out", "circles")
+    return folder / "circles" / "circular-circle-pid.png"
+
+
 def _plate(folder: Path) -> None:
     save(blocks("docs/from-drawing-to-part.md"), folder)
     _rds(folder, "nc", "make", "job", "plate.toml", "--out", "plate.ngc")
@@ -62,6 +70,7 @@ PICTURES: dict[str, Callable[[Path], Path]] = {
     "plate-path": plate_path,
     "plate-cut": plate_cut,
     "plate-left": plate_left,
+    "circular-test": circular_test,
 }
 
 

@@ -18,7 +18,7 @@ def report(
     ],
     data: Annotated[
         list[Path] | None,
-        typer.Argument(help="Data files: CSV tables or bus logs; oacs:O32 is a table of oacs-thesis's appendices."),
+        typer.Argument(help="Data: CSV tables, bus logs, a run; oacs:O32 is a table of oacs-thesis's appendices."),
     ] = None,
     set_: Annotated[
         list[str] | None,

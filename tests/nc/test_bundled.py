@@ -35,6 +35,7 @@ def test_there_are_those_of_the_paper_and_of_the_theses() -> None:
         for name in (
             "square",
             "circle",
+            "circular_test",
             "quadrants",
             "pocket",
             "pyramid",
@@ -49,7 +50,7 @@ def test_there_are_those_of_the_paper_and_of_the_theses() -> None:
     assert PROGRAMS["slot.ngc"].machine == PROGRAMS["sun.ngc"].machine == "three-axis-mill"
     assert PROGRAMS["pyramid.ngc"].machine == "starmill"
     assert PROGRAMS["oacs-p001.ngc"].machine == "mrmt-oacs"
-    with pytest.raises(InputError, match="there are circle, dcs-table-5-2"):
+    with pytest.raises(InputError, match="there are circle, circular_test, dcs-table-5-2"):
         find_bundled("star")
 
 
@@ -95,6 +96,10 @@ def test_the_shapes_are_what_their_titles_say() -> None:
     assert square["length"][~square["rapid"]] == pytest.approx([40.0] * 4)
     (circle,) = path("circle")
     assert circle["length"] == pytest.approx(2 * np.pi * 20)
+    turns = path("circular_test")
+    assert np.degrees(turns["sweep"][turns["plane"] >= 0]) == pytest.approx(
+        [180, 360, 360, 180, -180, -360, -360, -180]
+    )
     arcs = path("quadrants")
     assert np.degrees(arcs["sweep"]) == pytest.approx([90.0] * 4 + [-90.0] * 4)
     assert np.all(arcs["plane"] >= 0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from math import cos, sin
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,9 @@ PATH = (
     "2,4,0,-1,0,20,0,0,0,0,0,0,0,0\n"
 )
 GAUGES = "time_s,x_mm,y_mm,z_mm,segment\n0,0,0,0,0\n1,20,20,0,0\n3,70,20,0,1\n4,0,20,0,1\n5,0,10,0,2\n6,0,0,0,2\n"
+CIRCLE = "x_mm,y_mm\n" + "".join(
+    f"{10 * cos(k / 90):.6f},{10.01 * sin(k / 90):.6f}\n" for k in (*range(600), *range(600, 0, -1))
+)
 DATA: dict[str, tuple[Any, dict[str, str]]] = {
     "accuracy": (COUNTS_X, MOVE),
     "moves": (MOVE_TIMES, {}),
@@ -38,6 +42,7 @@ DATA: dict[str, tuple[Any, dict[str, str]]] = {
     "reconfiguration": (RECONFIGURATION, {}),
     "speed": (SPEED, {"pulse": "0.005"}),
     "flatness": (FACE, {"tolerance": "0.1"}),
+    "circular": (CIRCLE, {"radius": "10"}),
     **dict.fromkeys(("return-error", "unsynchronized-rapids", "path-error"), ((GAUGES, PATH), {})),
 }
 

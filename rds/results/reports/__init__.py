@@ -1,5 +1,5 @@
 """Reports of what was measured on a machine: accuracy, moves, response times, currents, vibration, reconfiguration,
-speed, flatness; return error, rapids and path error of part programs.
+speed, flatness; return error, rapids and path error of part programs; the circular test of two axes.
 
 One door: a kind of report, data files and options in; tables, pictures and findings out. Light to import: matplotlib
 and python-can are imported by what needs them. A module of a kind has `SETTINGS`, its options by name (`Setting`),
@@ -32,6 +32,7 @@ KINDS = Registry(
         "return-error": "rds.results.reports.return_error",
         "unsynchronized-rapids": "rds.results.reports.unsynchronized_rapids",
         "path-error": "rds.results.reports.path_error",
+        "circular": "rds.results.reports.circular",
     },
     own=False,
 )
