@@ -78,6 +78,27 @@ def test_one_lost_sync_between_two_commands_is_borne(rig: Rig) -> None:
     assert rig.drive.state is State.OPERATION_ENABLED and not rig.emergencies()
 
 
+@pytest.mark.parametrize(
+    "order",
+    ["1.9 S .05 C .1 C .05 S", "1 S .05 C .1 C .05 S", "1 S .05 C 1.05 C .05 S", "1.1 S 1 S .1 C .9 S .1 C .5 C .4 S"],
+)
+def test_a_host_that_was_late_is_not_taken_for_two(rig: Rig, order: str) -> None:
+    """Its SYNC overtakes a command, which the next one follows within the same period: periods, SYNC or command."""
+    push(rig, 100)
+    torque = 100
+    words = order.split()
+    for after, frame in zip(words[::2], words[1::2], strict=True):
+        rig.t += float(after) * T
+        torque += frame == "C"
+        rig.send(*((0x80, b"") if frame == "S" else (0x200 + rig.node, rig.pack(0x0F, torque))))
+    assert rig.read(0x6071) == torque  # the newest is taken
+    rig.cycle(103)
+    assert rig.drive.state is State.OPERATION_ENABLED and not rig.emergencies()
+    rig.send(0x200 + rig.node, rig.pack(0x0F, 700))  # of another host
+    rig.cycle(105)
+    assert rig.drive.state is State.FAULT and rig.emergencies() == [0x8150] and rig.voltage == 0.0
+
+
 def test_one_lost_command_is_borne(rig: Rig) -> None:
     push(rig)
     rig.t += T

@@ -37,6 +37,7 @@ SAVE, LOAD = 0x65766173, 0x64616F6C  # "save" and "load": what 0x1010 and 0x1011
 _ON_COMMAND = 1  # 0x1010 and 0x1011: it does so on command
 _CLOSE = 0.75  # periods: of any two hosts with one period, one comes closer than that after the other
 _NONE_LOST = 1.5  # periods between two SYNCs: in less, none can have been lost
+_LATE = 10  # SYNCs after one without a command in which that command may still come
 _MOVING = 2e-3  # s between two looks at an axis under power if no frame comes
 
 
@@ -282,7 +283,9 @@ class Drive:
         if contradicted and not was_lost and self.state is State.OPERATION_ENABLED:
             self.operation.fault(codes.IDENTIFIER_COLLISION)
         for received in self.receive_pdos:
-            if received.waiting is not None:
+            if received.waiting is None:
+                received.missed = self.syncs
+            else:
                 waiting, received.waiting = received.waiting, None
                 received.apply(waiting, self._refused)
         self.operation.sync()
@@ -311,12 +314,16 @@ class Drive:
         """Whether two hosts command: two commands for one SYNC, too close for one whose SYNC was lost.
 
         The next SYNC decides about those that are further apart: if it comes in time, none was lost between them. A
-        host that takes the power away may always change its mind.
+        host that takes the power away may always change its mind. Where a SYNC has just found no command, one of the
+        two is the one that it missed: that waited for the bus together with SYNC, which goes first.
         """
-        if pdo.waiting is None or pdo.waiting == data or self.state is not State.OPERATION_ENABLED:
+        if pdo.waiting in (None, data) or self.state is not State.OPERATION_ENABLED:
             return False
         word = int.from_bytes(data[:2], "little") if pdo.mapped[0] == (0x6040, 0) else codes.ENABLE_OPERATION
         if command(word) is not Command.ENABLE_OPERATION:
+            return False
+        if self.syncs - pdo.missed < _LATE:
+            pdo.missed = -inf
             return False
         self._contradicted = True
         return self.operation.now - pdo.came_at < _CLOSE * self.operation.period

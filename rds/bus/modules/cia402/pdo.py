@@ -189,6 +189,7 @@ class Rpdo(Pdo):
         super().__init__(number, dictionary)
         self.waiting: bytes | None = None  # data that the next SYNC makes act
         self.came_at = 0.0  # s, those data
+        self.missed = -inf  # number of the SYNC that found none, until a command more than one makes up for it
         self.deadline = inf  # s, by the event timer
 
     def apply(self, data: bytes, refused: Callable[[Key, Any], None]) -> None:
