@@ -265,7 +265,7 @@ class Execution:
 
     def _stops(self, value: float) -> bool:
         if value == STEP:
-            return bool(self._values[SINGLE_STEP])
+            return bool(self._values[SINGLE_STEP]) and self._feed != TIED_FEED
         return not value or bool(self._values[OPTIONAL_STOP])
 
     def _await_spindle(self) -> None:
