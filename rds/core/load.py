@@ -9,8 +9,10 @@ import dis
 import hashlib
 import inspect
 import io
+import linecache
 import re
 import tokenize
+import traceback
 import types
 import warnings
 from collections.abc import Callable, Mapping
@@ -269,7 +271,17 @@ def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source:
 def missing_param(error: BaseException, params: Mapping[str, Any], source: Source | None) -> str:
     """How to define the parameter for want of which control() failed; empty where it was not that."""
     key = error.args[0] if isinstance(error, KeyError) and error.args else None
-    return "" if not isinstance(key, str) or key in params else how_to_define("params", f"{{{key!r}: 1.0}}", source)
+    if not isinstance(key, str) or key in params or _is_of_another_dict(error, key, params):
+        return ""
+    return how_to_define("params", f"{{{key!r}: 1.0}}", source)
+
+
+def _is_of_another_dict(error: BaseException, key: str, params: Mapping[str, Any]) -> bool:
+    """Whether the line that failed looks into a dict of other keys than those of `params`, and without this one."""
+    *_, (frame, number) = traceback.walk_tb(error.__traceback__)
+    names = re.findall(r"(\w+)\s*\[", linecache.getline(frame.f_code.co_filename, number))
+    dicts = [each for name in names if type(each := frame.f_locals.get(name, frame.f_globals.get(name))) is dict]
+    return any(key not in each and each.keys() != params.keys() for each in dicts)
 
 
 def how_to_define(name: str, example: str, source: Source | None) -> str:

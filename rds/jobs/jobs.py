@@ -154,7 +154,9 @@ class Jobs:
         """Until it is over; then the next one of the queue."""
         try:
             run.ready()
-            job.state = RUNNING
+            with self._lock:
+                if self._current is job:  # else it took too long to stop, and is left behind
+                    job.state = RUNNING
             run.wait()
         except BaseException as error:
             self._over(job, sentence(error))

@@ -144,7 +144,7 @@ class _Converter:
         self._last_line = call.line or self._last_line
         if self._passed_over.take(call, call.file or self._file):
             return
-        self._convert()
+        self._convert(call)
         action = _ACTIONS.get(call.name)
         if action is None:
             said = f"{call.name} is nothing that a machine here can do; leave its word out"
@@ -173,14 +173,16 @@ class _Converter:
             self._done.append(PathBlock(segments, self._events, self._file, self._tool, feed_lines))
         self._segments, self._feed_lines, self._events, self._count = [], [], [], 0
 
-    def _convert(self) -> None:
-        """The rows that wait become segments."""
+    def _convert(self, behind: Call | None = None) -> None:
+        """The rows that wait become segments; `behind` them comes this call."""
         if not self._rows:
             return
         rows = np.concatenate(self._rows) if len(self._rows) > 1 else self._rows[0]
         self._rows, self._waiting = [], 0
-        if self._locked and not self._feeds.pitch:  # what moves in the very line of a lock is a tap
-            taps = bool(np.all(rows["line"] == self._locked_line))
+        if self._locked and not self._feeds.pitch:
+            # in the line of its lock a tap goes on with the spindle, and the way out of a thread ends the lock
+            ends = behind is not None and behind.line == self._locked_line and behind.name in _ENDS_OF_TAPS
+            taps = ends and bool(np.all(rows["line"] == self._locked_line))
             self._leave_feed_to(TIED_FEED if taps else LOCKED_FEED, self._locked_line)
         speeds = np.flatnonzero(rows["kind"] == SPEED)
         given = rows[speeds]
@@ -387,6 +389,7 @@ class _Converter:
         self._ended = True
 
 
+_ENDS_OF_TAPS = frozenset({"STOP_SPINDLE_TURNING", "ENABLE_FEED_OVERRIDE"})
 _ACTIONS: dict[str, Callable[[_Converter, Call], Any]] = {
     "USE_LENGTH_UNITS": _Converter._units,
     "SELECT_PLANE": _Converter._plane,

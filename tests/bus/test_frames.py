@@ -46,6 +46,14 @@ def test_a_command_carries_its_number_beside_its_voltages(voltages: list[float],
     assert frames.number_voltages(numbered, 0) == plain
 
 
+def test_the_scale_is_that_of_a_file_with_other_digits() -> None:
+    """1/600 with seven digits, or 3 times 0.1, is the same axis; 0.8 % more, another unit or another range is not."""
+    assert frames.scale("mm", 1 / 600, 10) == frames.scale("mm", 0.00166667, 10.0)
+    assert frames.scale("mm", 0.3, 10.0) == frames.scale("mm", 3 * 0.1, 10.0)
+    others = [("mm", 0.001008, 10.0), ("deg", 0.001, 10.0), ("mm", 0.001, 5.0)]
+    assert frames.scale("mm", 0.001, 10.0) not in {frames.scale(*each) for each in others}
+
+
 @given(st.integers(1, 95), st.integers(0, frames.SERIALS - 1), st.integers(0, 2**32 - 1), st.integers(0, 65535))
 def test_identities_come_back_and_differ_in_their_identifiers(node: int, serial: int, process: int, scale: int) -> None:
     identity = frames.Identity(node, serial, process, scale=scale)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 from math import inf
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import can
@@ -101,6 +102,20 @@ def test_a_drive_whose_home_offset_has_the_other_sign_is_told_and_can_be_homed(
     with drivers(machine, channel, ["X"], cia402={"positions": "drive", "axis": {"X": axis}}) as host:
         host.start()
         assert host.exchange() == [-12.5]
+
+
+@pytest.mark.parametrize("stands", [-100_000, -99_960, 0, 1, 40])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_drive_that_ends_its_homing_beside_its_mark_or_at_its_zero_is_a_right_one(
+    monkeypatch: pytest.MonkeyPatch, stands: int, sign: int
+) -> None:
+    """A count to the offset's side of zero was refused, with a remedy that would have put home at the wrong place."""
+    drive: Any = SimpleNamespace(name="X", home_offset=sign * 100_000)
+    monkeypatch.setattr(configure, "_position", lambda node: sign * stands)
+    configure._check_home(drive, drive)
+    monkeypatch.setattr(configure, "_position", lambda node: sign * (100_000 + stands % 100))
+    with pytest.raises(MachineError, match="the other way round"):
+        configure._check_home(drive, drive)
 
 
 def test_whoever_watches_a_homing_sees_it_move_and_can_end_it(machine: Machine, served: Served) -> None:

@@ -189,6 +189,19 @@ def test_a_missing_initial_state_is_noticed_before_the_run(write):
     assert check_controller(write(lazy)).ok
 
 
+@pytest.mark.parametrize(("looks", "is_params"), [("p['slow']", True), ("GAINS['slow']", False)])
+def test_only_a_key_that_is_missing_in_params_is_to_be_defined_there(write, looks, is_params):
+    """A slip in the key of a table of the student's own was to become a parameter, which helps nothing."""
+    body = f"    p = params\n    return {looks}, state\n"
+    file = write("GAINS = {'fast': 30.0}\ndef control(t, r, y, state, params):\n" + body)
+    assert ("define it, as in `params = {'slow': 1.0}`" in str(check_controller(file))) is is_params
+    if is_params:
+        with pytest.raises(ContractError, match="looks for 'slow', which is not in params"):
+            load_student(file).controller()
+    else:
+        load_student(file).controller()  # whoever runs it reports it
+
+
 @pytest.mark.parametrize("fails", ["r - y", "control.no_such", "len(params['gain'])", "float('x')"])
 def test_a_controller_that_fails_whatever_its_state_is_not_told_to_have_another(write, fails):
     text = f"params = {{'gain': 1.0}}\ndef control(t, r, y, state, params): return {fails}, state\n"

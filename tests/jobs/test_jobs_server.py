@@ -211,6 +211,15 @@ def test_a_simulation_that_waits_is_left_behind_once_it_is_stopped(
     assert "did not end within" in waits.status()["error"] and other.status()["ending"] == "done"
 
 
+def test_a_job_that_was_left_behind_before_it_ran_stays_over(tmp_path: Path) -> None:
+    """It was running again without end, and could not be dropped."""
+    jobs, job = Jobs(Folder(tmp_path)), SimpleNamespace(state="starting", error=None)
+    jobs._current = job  # type: ignore[assignment]
+    run = SimpleNamespace(ready=lambda: jobs._over(job, "left behind"), wait=lambda: None)  # type: ignore[arg-type]
+    jobs._follow(job, run)  # type: ignore[arg-type]
+    assert (job.state, job.error) == ("over", "left behind")
+
+
 def test_a_file_that_raises_keyboard_interrupt_does_not_end_the_server(serve: Serve) -> None:
     server = serve()
     (server.folder / "law.py").write_text("raise KeyboardInterrupt\n")

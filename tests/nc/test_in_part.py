@@ -48,6 +48,20 @@ def test_the_command_takes_both_and_what_holds_before_holds(file: Path, tmp_path
     assert set(result["program_override"][result["program_line"] == 8.0]) == {0.0, 1.0}  # M49: no override
 
 
+def test_a_thread_of_two_lines_is_one_step_and_the_way_to_its_middle_can_be_held(file: Path) -> None:
+    file.write_text("G21 G90\nM3 S600\nG0 Z5\nG33 Z-2 K1\nG33 X8 Z-3 K1\nG0 Z5\nM2\n")
+    program = PartProgram(file, steps=True)
+    happenings = program.prepared.program.happenings
+    assert [each.line for each in happenings if (each.kind, each.value) == ("stop", STEP)] == [3, 4, 5]
+    result = program.run()
+    assert State.STOP in result["program_state"][result["program_line"] == 5]
+    assert State.STOP not in result["program_state"][result["program_line"] == 4]
+    part = PartProgram(file, begin=5).prepared  # up, across (nowhere) and down, before the feed is the spindle's
+    begins = next(each.sample for each in part.program.happenings if each.kind == "override")
+    assert part.program.position[begins].tolist() == part.path["start"][part.path["line"] == 5][-1, :3].tolist()
+    assert part.program.position[begins, 2] == -2.0
+
+
 def test_a_line_after_the_last_move_and_an_interpolator_are_refused(file: Path) -> None:
     with pytest.raises(InputError, match="nothing moves from line 10 on; the last line that moves is 9"):
         PartProgram(file, begin=10)

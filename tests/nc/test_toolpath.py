@@ -255,7 +255,10 @@ def test_how_the_stream_is_cut_into_blocks_changes_nothing(
         ("M48\nG1 X1", []),
         ("G1 X1\nM49\nG1 X2\nM48\nG1 X3", [(0, 1, 3), (1, 0, 5)]),
         ("M50 P0\nM50 P1\nG1 X1", []),
-        ("M49 G1 X1\nX2", [(-1, 1, 2), (1, 0, 4)]),  # with others behind it, a move in the line of M49 is none of a tap
+        ("M49 G1 X1\nX2", [(-1, 1, 2), (1, 0, 4)]),  # a move in the line of M49 is none of a tap
+        ("M49 G1 X1", [(-1, 1, 2), (0, 0, 3)]),
+        ("M50 P0 G1 X1\nG4 P1\nX2", [(-1, 1, 2), (1, 0, 5)]),
+        ("M49 G84 X1 Z-2 R1\nG80", [(-1, 1, 2), (1, 2, 2), (3, 0, 4)]),
         ("G33 X1 K1\nG33 X3 Z-1 K1\nG1 X4", [(-1, 2, 2), (1, 0, 3)]),  # threads go on into each other
         ("G84 X1 Z-2 R1\nX2\nG80", [(1, 2, 2), (3, 0, 2), (4, 2, 3), (6, 0, 3)]),
         ("M49\nG84 X1 Z-2 R1\nG80\nG1 X3", [(-1, 1, 2), (1, 2, 3), (3, 1, 3), (4, 0, 6)]),

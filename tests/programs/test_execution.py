@@ -307,6 +307,21 @@ def test_a_thread_is_cut_at_the_feed_of_its_spindle() -> None:
     assert stop.reason == "stopped in line 2"
 
 
+@pytest.mark.parametrize("changes", [[("hold", 1), ("hold", 0)], [("override", 0.0), ("override", 1.0)]])
+def test_a_hold_before_a_thread_keeps_it_from_beginning(changes: list[tuple[str, float]]) -> None:
+    """It was pressed in a dwell, or where the axes rested anyhow, and the thread was cut all the same."""
+    program = prepared(
+        PATH, Event(0, "dwell", 0.5, 2), Event(0, "override", TIED_FEED, 2), Event(1, "override", 0.0, 3)
+    )
+    begins = next(each.sample for each in program.program.happenings if each.kind == "dwell") * T + 0.1
+    held = execute(program, [(begins, *changes[0])])
+    assert "nobody is there" in held.reason and held.state[-1] == State.HELD
+    assert held.position[-1].tolist() == PATH["end"][0, :3].tolist()
+    ran = execute(program, [(begins, *changes[0]), (begins + 2.0, *changes[1])])
+    assert ran.position[-1].tolist() == PATH["end"][-1, :3].tolist()
+    assert execute(program, [(begins, *changes[0]), (begins + 2.0, "stop", 1)]).reason.startswith("stopped in line")
+
+
 def test_discarded_samples_are_not_lost_time() -> None:
     """A machine does not wait: where the loop was late, the path goes on."""
     program = whole().program

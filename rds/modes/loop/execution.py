@@ -208,7 +208,7 @@ class Execution:
             self._end(Ending.STOPPED, f"stopped in line {self._line}")
         elif is_still and self._leaves():
             self._go_home()
-        elif not is_there and follower.rate == 0.0 and wanted == 0.0:
+        elif (not is_there and follower.rate == 0.0 and wanted == 0.0) or self._keeps_from_a_thread():
             self._held()
         else:
             self.state = State.RUNS
@@ -230,6 +230,10 @@ class Execution:
         """What is due where the path has come to; the last of it ends the program."""
         happenings, place = self._follower.happenings, self._follower.place
         while self._next < len(happenings) and happenings[self._next].sample <= place:
+            if self._keeps_from_a_thread():
+                self._follower.settle(0.0)
+                self._held()
+                return
             happening = happenings[self._next]
             self._next += 1
             self._line = happening.line or self._line
@@ -237,6 +241,14 @@ class Execution:
                 return
         if self._next >= len(happenings) and self._follower.place >= self._follower.last:
             self._end(Ending.DONE, "")
+
+    def _keeps_from_a_thread(self) -> bool:
+        """Whether a thread is due, in which no hold would act, and somebody holds the axes before it."""
+        happenings = self._follower.happenings
+        if self._next >= len(happenings) or happenings[self._next].sample > self._follower.place:
+            return False
+        due = happenings[self._next]
+        return due.kind == "override" and due.value == TIED_FEED and self._wanted() == 0.0 and not self._values[STOP]
 
     def _takes_time(self, happening: ProgramEvent) -> bool:
         kind, value = happening.kind, happening.value
@@ -265,7 +277,7 @@ class Execution:
 
     def _stops(self, value: float) -> bool:
         if value == STEP:
-            return bool(self._values[SINGLE_STEP])
+            return bool(self._values[SINGLE_STEP]) and self._feed != TIED_FEED
         return not value or bool(self._values[OPTIONAL_STOP])
 
     def _await_spindle(self) -> None:

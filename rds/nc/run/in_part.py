@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.shared_quantities import TIED_FEED
 from rds.interpolators.motion.segments import AXES, EXACT_STOP, JOINTS, line
 from rds.modes.loop.program import STEP, Program, ProgramEvent
 from rds.nc.path_block import Event, PathBlock
@@ -73,6 +74,8 @@ def _approach(first: np.ndarray, top: float, latest: dict[str, Event], tool: int
         rate = float(first["rate"]) if cuts else _FASTEST
         moves.append(line(start.tolist(), end.tolist(), rate, rapid=not cuts, mode=EXACT_STOP, program_line=number))
     events = [latest[kind]._replace(after=-1) for kind in _KEPT if kind in latest]
+    if events and events[-1][1:3] == ("override", TIED_FEED):  # on the way to a thread a hold is no harm
+        events[-1] = events[-1]._replace(after=len(moves) - 1)
     segments = np.concatenate(moves) if moves else np.zeros(0, first.dtype)
     return PathBlock(segments, events, tool=tool)
 

@@ -222,9 +222,12 @@ def _wait_for_home(node: canopen.RemoteNode, drive: DriveSettings, deadline: flo
 
 
 def _check_home(node: canopen.RemoteNode, drive: DriveSettings) -> None:
-    """MachineError for a drive that takes 0x607C as the position that home gets: CiA 402 says minus that."""
+    """MachineError for a drive that takes 0x607C as the position that home gets: CiA 402 says minus that.
+
+    One that has run on past its mark, or on to its zero, stands at neither.
+    """
     offset = drive.home_offset or 0
-    if abs((stands := _position(node)) - offset) < abs(stands + offset):
+    if abs((stands := _position(node)) - offset) < abs(offset) / 4:
         raise MachineError(
             f"{drive.name}: it stands at {stands} counts after homing, where `home` asks for {-offset}: this drive's "
             "home offset 0x607C is the position that home gets, which CiA 402 counts the other way round; take `home` "

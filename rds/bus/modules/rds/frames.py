@@ -90,7 +90,6 @@ _VOLTAGES = Struct(f"<{SLOTS}h")
 _NUMBER_BITS = 0x0003_0003_0003_0003
 _SETUP = Struct("<II")
 _IDENTITY = Struct("<BBHI")
-_SCALE = Struct("<dd")
 _ANSWER = Struct("<iBBH")
 _FORCE = Struct("<fHH")
 
@@ -242,11 +241,12 @@ def decode_identity(identifier: int, data: bytes | bytearray) -> Identity | None
 
 
 def scale(unit: str, resolution: float, range: float) -> int:
-    """What a module's counts and volts mean, in 16 bits: of the CRC-32 of two float64 and the unit the lower ones.
+    """What a module's counts and volts mean, in 16 bits: the lower ones of the CRC-32 of a text, such as "mm 0.001 10".
 
-    Unit of the axis, its units per count, and the converter's range in V. Never 0.
+    Unit of the axis, its units per count, and the converter's range in V, the numbers with four digits: two files may
+    write 1/600 with other ones. Never 0.
     """
-    return zlib.crc32(_SCALE.pack(resolution, range) + unit.encode()) & 0xFFFF or 1
+    return zlib.crc32(f"{unit} {resolution:.4g} {range:.4g}".encode()) & 0xFFFF or 1
 
 
 def encode_clock(node: int, seconds: float) -> tuple[int, bytes]:
