@@ -241,10 +241,10 @@ def test_a_fault_with_a_time_strikes_while_it_lasts(medium: Medium[str]) -> None
 def test_an_unplugged_node_hears_nothing_and_what_it_sends_waits(medium: Medium[str]) -> None:
     hand = Hand(medium)
     hand.inject("unplug", node="B", duration=1.0)
-    medium.offer("A", record(1), 0)
-    medium.offer("B", record(2), 0)
-    assert heard(medium, SECOND // 2) == [(1, "C")]
-    assert heard(medium, 2 * SECOND) == [(2, "AC")]
+    medium.offer("A", record(2), 0)
+    medium.offer("B", record(1), 0)  # it would win, but takes no part
+    assert heard(medium, SECOND // 2) == [(2, "C")]
+    assert heard(medium, 2 * SECOND) == [(1, "AC")]
     medium.offer("A", record(3), 2 * SECOND)
     assert heard(medium, 3 * SECOND) == [(3, "BC")]
 
@@ -269,6 +269,16 @@ def test_a_plug_pulled_while_sending_is_an_error_for_the_others() -> None:
     assert [medium.stations[name].counters.rec for name in "BC"] == [1, 1]
     medium.plug("A", SECOND)
     assert [identifier_of(delivery) for delivery in drain(medium, 2 * SECOND)] == [1]
+
+
+def test_a_plug_pulled_while_another_sends_the_same_frame_disturbs_nobody() -> None:
+    medium = bus()
+    for name in "AB":
+        medium.offer(name, record(1, bytes(8)), 0)
+    medium.take(50_000)
+    medium.unplug("A", 50_000)
+    (delivery,) = drain(medium, SECOND)
+    assert (delivery.at, medium.errors) == (frame_time(1, bytes(8), bitrate=MBIT), 0)
 
 
 def test_a_dead_node_says_no_more(medium: Medium[str]) -> None:
