@@ -90,7 +90,7 @@ def test_a_rate_above_one_keeps_the_limits_too_and_rises_in_steps():
 
 @pytest.mark.parametrize("said, factor", [(0.0, 1.0), (None, 0.7), (60.0, 1.2), (1e9, 20.0)])
 def test_a_machines_cell_lowers_the_rate_only(said, factor):
-    """One that has said nothing yet is simulated, with the hardness of 0.7; none is believed beyond 20 times the law."""
+    """One that has said nothing yet is simulated, here with 0.7 of the law; 20 times the law is the most it may say."""
     guarding = ForceGuard(np.full(9, 50.0), np.full(9, 0.5), 0.75, hardness=0.7).start(0.01, lambda: said)
     for _ in range(200):
         guarding.allowed(0, 1.0)

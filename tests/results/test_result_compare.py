@@ -46,7 +46,9 @@ def test_samples_are_matched_by_number_not_by_row() -> None:
     assert comparison.axes["X"].samples == 2
     assert comparison.axes["X"].identical
     assert not comparison.identical  # each has samples that the other lacks
-    assert not compare(small([0.0, 1.0]), small([0.0, 1.0, 2.0])).identical
+    longer = compare(small([0.0, 1.0]), small([0.0, 1.0, 2.0]))
+    assert not longer.identical
+    assert longer.notes == ("2 samples are common; the first result has 2, the second 3",)
     assert "2 samples are common; the first result has 4, the second 3" in comparison.notes
     time, difference = comparison.difference("X")
     assert time.tolist() == pytest.approx([0.2, 0.3])
@@ -54,7 +56,8 @@ def test_samples_are_matched_by_number_not_by_row() -> None:
 
 
 def test_a_column_that_one_result_lacks_is_not_compared() -> None:
-    driven = Result(dict(small([0.0, 1.0]).columns) | {"X_voltage": [1.0, 2.0]}, meta=small([]).meta)
+    more = {"X_voltage": [1.0, 2.0], "X_speed": [1.0, 2.0]}
+    driven = Result(dict(small([0.0, 1.0]).columns) | more, meta=small([]).meta)
     for pair in ((driven, small([0.0, 1.0])), (small([0.0, 1.0]), driven)):
         assert compare(*pair).identical
 
