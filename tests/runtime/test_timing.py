@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import booleans, dictionaries, floats, integers
 
-from rds.core.types import Verdict
+from rds.core.clock import LatePolicy, RealTimeClock
+from rds.core.types import Ending, Verdict
+from rds.modes.loop.loop import Loop
+from rds.modes.loop.stopwatch import Stopwatch
 from rds.modes.process.timing import Timing, judge, late_samples, longest_run, own_wait, replay, summary
 
 MS = 1_000_000
@@ -288,6 +292,41 @@ def test_the_replay_by_hand() -> None:
     work = np.array([0.5, 2.5, 0.5, 0.5, 0.5, 0.5]) * MS
     assert replay(work, np.arange(6), MS).tolist() == [False, True, True, True, False, False]
     assert replay(work, np.array([0, 1, 4, 5, 6, 7]), MS).tolist() == [False, True, False, False, False, False]
+
+
+@pytest.mark.parametrize("sets_references, stages", [(True, (2, 4)), (False, (0, 6))])
+def test_each_stage_has_its_own_time(sets_references: bool, stages: tuple[int, int]) -> None:
+    """Stages of 1, 2, 4, 8 and 16 µs, begun 32 µs after the sample is due; 3 µs are taken from the code."""
+    clock, at, spans, counted = RealTimeClock(MS, LatePolicy(stop_after=1)), [0], [], []
+
+    def taking(micros: int, *gives: float, late: int = 0) -> Callable[..., Any]:
+        def stage(k: object = None, *_: object) -> Any:
+            at[0] += 1000 * (micros + (late if k == 2 else 0))
+            return list(gives)
+
+        return stage
+
+    def wait(k: int) -> int:
+        at[0] = (k + 1) * MS + 32_000  # sample 0 is due one period after the start
+        return k
+
+    clock.now, clock.wait = (lambda: at[0]), wait  # type: ignore[method-assign]
+    clock.start()
+    rows: list[list[float]] = []
+    stopwatch = Stopwatch(clock, rows.append, lambda: False)
+    stopwatch.thread.taken = lambda span: spans.append(span) or 3000  # type: ignore[method-assign, func-returns-value]
+    stopwatch.instructions.end = counted.append  # type: ignore[method-assign]
+    laws = [taking(2), taking(4, late=1000)]
+    parts = (taking(1, 0.0), laws, taking(8, 0.5), taking(16, 0.7), rows.append, lambda k: None)
+    loop = Loop(9, wait, *parts, sets_references=sets_references)
+    ending = stopwatch.time(loop).run()
+    stopwatch.close()
+    assert rows[:2] == [[k, 32_000, 9000, stages[0] * 1000, stages[1] * 1000, 16_000, 3000, 0.5, 0.7] for k in (0, 1)]
+    assert spans[0] == 30_000 and counted[0] == 30_000 - 3000 - 8000
+    assert (ending, len(rows)) == (Ending.OVERLOADED, 3)
+    stopped = Stopwatch(clock, rows.append, lambda: True)
+    assert (stopped.time(loop).run(), len(rows)) == (Ending.STOPPED, 4)
+    stopped.close()
 
 
 def test_the_summary_counts_and_sorts() -> None:
