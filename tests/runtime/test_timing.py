@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -188,6 +189,27 @@ def test_a_stall_seen_by_the_rehearsal_counts() -> None:
     assert verdict(compute=some(50, 2.0), stalls=5) == Verdict.MISSED
 
 
+@pytest.mark.parametrize(
+    "longest, stolen, expected", [(600, 0, Verdict.MISSED), (700, 0, Verdict.VOID), (600, 1, Verdict.VOID)]
+)
+def test_an_overrun_beyond_three_times_the_longest_stall_is_the_codes(
+    longest: float, stolen: int, expected: Verdict
+) -> None:
+    """It takes 3.01 ms: a period of 1 ms, and more than three times 0.6 ms, but not 0.7 ms. A clock tick is 10 ms."""
+    timing, counts = ran(inside={500: 2.85})
+    environment = {"rehearsal": {"lateness_max": longest}, "stolen_ticks": stolen}
+    assert judge(timing, MS, **counts, stalls=1, environment=environment).verdict == expected
+
+
+def test_discarded_periods_count_where_a_module_fell_silent() -> None:
+    """Of 50 periods that were not kept, a module must have been silent in half to be what held them up."""
+    timing, counts = ran(waits={500: 50.0}, discard=True)
+    assert counts["discarded"] == 50
+    for silent, who in ((9, "the computer"), (24, "the computer"), (25, "a module")):
+        judgement = judge(timing, MS, **counts, silent=silent)
+        assert judgement.verdict == Verdict.VOID and judgement.reason.startswith(who)
+
+
 def test_threads_that_the_code_left_running_are_its_own() -> None:
     waits = dict.fromkeys(range(10, N, 100), 5.0)
     timing, counts = ran(waits=waits)
@@ -242,6 +264,10 @@ def test_reasons_say_what_and_how_much() -> None:
     judgement = judge(timing, MS, **counts, missing=20)
     assert judgement.reason.startswith("the computer or the bus was busy")
     assert "20 answers did not come within the period" in judgement.evidence
+    throttled = {"scheduler": "SCHED_FIFO 80", "rt_runtime_us": 950_000, "rt_period_us": 1_000_000}
+    assert "for about the 50 ms of each second" in judge(timing, MS, **counts, environment=throttled).evidence
+    timing, counts = ran(compute=0.95)  # with the I/O it is too much in every sample
+    assert "took 0.960 ms at the 99th percentile" in judge(timing, MS, **counts).reason
     timing, counts = ran(waits={500: 1.0})
     assert "within the limit of 9" in judge(timing, MS, limit=9).reason
     assert "all 1000 samples" in judge(ran()[0], MS).reason
@@ -337,6 +363,9 @@ def test_the_summary_counts_and_sorts() -> None:
     assert report["compute"]["max"] == pytest.approx(3000.0)
     assert sum(report["compute"]["histogram"]) == N
     assert len(report["compute"]["histogram"]) == len(report["histogram_edges_us"])
+    assert report["lateness"]["p50"] == 0.0 and "interpolate" not in report, "there was no path"
+    along = replace(timing, interpolate=np.full(N, 20_000.0))
+    assert summary(along, MS)["interpolate"]["p99"] == pytest.approx(20.0)
     assert report["late"] == int(late_samples(timing, MS).sum())
     assert report["longest_late_run"] == 3
     assert longest_run(np.array([], dtype=bool)) == 0
