@@ -107,6 +107,12 @@ def test_the_line_is_that_of_the_right_table_of_several(tmp_path: Path) -> None:
         (RMS.replace('"rms"', '"b"').replace("rms-error", "noise-error"), "needs a case with noise"),
         (RMS.replace('"rms"', '"b"').replace("rms-error", "model-fit"), "is for model assignments"),
         (RMS.replace('"rms"', '"b"').replace("rms-error", "unit-tests"), "need no case"),
+        (
+            RMS.replace('"rms"', '"b"').replace("rms-error", "unit-tests").replace('case = "sine"\n', ""),
+            "it has no test",
+        ),
+        (RMS.replace('"rms"', '"b"').replace('case = "sine"', "cases = []"), "must be a list of the names of cases"),
+        (RMS.replace('"rms"', '"b"') + 'cases = ["sine"]\n', "give one of them"),
         (RMS.replace('"rms"', '"b"').replace("rms-error", "path-followed"), "tolerance is missing"),
         (RMS.replace('"rms"', '"b"') + "from = -1.0\n", "at least 0"),
         (RMS.replace('"rms"', '"b"') + "partial = 2.0\n", "from 0 to 1"),
