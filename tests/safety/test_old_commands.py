@@ -92,13 +92,13 @@ def test_a_younger_one_is_obeyed(late: float) -> None:
     ],
 )
 def test_the_age_of_a_command_by_its_number(sent: int, came: float, verdict: Verdict) -> None:
-    """A sample period of 2 s: the numbers count seconds, and those before were on time."""
-    freshness = Freshness(2.0)
-    assert freshness.judge(10, 10.0) == Verdict.FIRST and not freshness.followed(10.0)
-    assert freshness.judge(11, 11.0) == Verdict.FRESH
-    assert freshness.followed(31.0) and not freshness.followed(31.01)
-    assert freshness.judge(sent, came) == verdict
-    assert freshness.followed(came) == (verdict in (Verdict.FRESH, Verdict.OLD, Verdict.STRANGE))
+    """A sample period of 1 s, instants in half periods as the numbers; those before were on time."""
+    freshness = Freshness(1.0)
+    assert freshness.judge(10, 5.0) == Verdict.FIRST and not freshness.followed(5.0)
+    assert freshness.judge(11, 5.5) == Verdict.FRESH
+    assert freshness.followed(15.5) and not freshness.followed(15.505)
+    assert freshness.judge(sent, came / 2) == verdict
+    assert freshness.followed(came / 2) == (verdict in (Verdict.FRESH, Verdict.OLD, Verdict.STRANGE))
 
 
 def test_a_first_command_that_no_second_agrees_with_is_forgotten() -> None:
