@@ -70,6 +70,8 @@ def test_margins_from_outside_are_those_from_within(law: str, plant: str, tmp_pa
     assert found.margins[1] == pytest.approx(phase, abs=0.1)
     assert found.margins[2] == pytest.approx(modulus, abs=2e-3)
     assert abs(found.poles[0]) == pytest.approx(radius, abs=2e-5)
+    w, locus = found.locus(1024)
+    assert len(w) == len(locus) >= 512 and w[-1] == pytest.approx(np.pi / 0.001)
 
 
 def test_damping_of_proportional_control_is_that_of_its_second_order_loop(tmp_path: Path) -> None:
