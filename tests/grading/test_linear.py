@@ -123,3 +123,18 @@ def test_a_loop_that_grows_within_a_few_samples_has_no_margins(gain: float) -> N
     found = closed(fit, library_model("linear-axis", tau=0.01, K=1.7), 1e-3)
     assert isinstance(found, NoLoop)
     assert found.is_known
+
+
+@pytest.mark.parametrize(
+    "gain, why, is_known",
+    [(-0.40, "", True), (-0.20, "takes longer than 16.4 s to die down", False), (1e-3, "does not die down", True)],
+)
+def test_a_deviation_must_die_down_to_a_thousandth_within_16_seconds(gain: float, why: str, is_known: bool) -> None:
+    """A slow loop goes as exp(K gain t): at 16 s to 2e-5 and 4e-3 of its largest, and upwards."""
+    fit = LawFit(np.array([1.0]), np.array([gain]), 0.0)
+    found = closed(fit, library_model("linear-axis", tau=0.01, K=1.7), 1e-3)
+    if isinstance(found, NoLoop):
+        assert why and why in found.why and found.is_known == is_known
+    else:
+        assert not why and len(found.position) == 1 << 14
+        assert abs(found.position[-1] / found.position.max()) == pytest.approx(np.exp(1.7 * gain * 16.4), rel=0.2)

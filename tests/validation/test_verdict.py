@@ -26,7 +26,7 @@ from rds.identification.validate.judge import judge
 from rds.identification.validate.same_data import overlap
 from rds.identification.validate.validate import Validation, validate
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
-from rds.identification.validate.within import frequency_told
+from rds.identification.validate.within import Measure, frequency_told
 from tests.validation.validation_logs import STEP, T, X, candidate, log, moved, square
 
 FRESH = square(8.0, 3.0, 0.7)
@@ -397,6 +397,59 @@ def test_a_reason_that_logs_share_is_given_once_with_their_names() -> None:
     verdicts = {name: Verdict(Word.PARTLY, name, (shared, own) if name == "a" else (shared,)) for name in "abcdef"}
     given = [reason.what for reason in overall(verdicts).reasons]
     assert given == ["a, b, c, d and 2 more: the fit warned of it", "a: the voltage is 2 % off"]
+
+
+@pytest.mark.parametrize(
+    "words, word, purpose",
+    [
+        ("valid, valid", "valid", ""),
+        ("valid, valid for", "valid for", "purpose of b"),
+        ("valid for, valid for", "valid for", "purpose of a; purpose of b"),
+        ("valid, not valid, valid for", "not valid", ""),
+        ("cannot tell, valid", "valid", ""),
+        ("cannot tell, not valid", "not valid", ""),
+        ("cannot tell, cannot tell", "cannot tell", ""),
+    ],
+)
+def test_several_logs_are_as_valid_as_the_least_that_can_tell(words: str, word: str, purpose: str) -> None:
+    given = [Word(each) for each in words.split(", ")]
+    verdicts = {
+        name: Verdict(each, f"{name} said.", (), f"purpose of {name}" if each is Word.PARTLY else "")
+        for name, each in zip("abc", given, strict=False)
+    }
+    found = overall(verdicts)
+    assert (found.word, found.purpose) == (word, purpose)
+    others = [f"{name}: {each}" for name, each in zip("abc", given, strict=False) if each != word]
+    assert f"Beside that: {', '.join(others)}." in found.sentence if others else "Beside" not in found.sentence
+    assert overall({"a": verdicts["a"]}) is verdicts["a"]
+    assert overall(verdicts, (Reason(Side.NOTE, "contradiction", "so"),)).sentence.endswith("contradict each other.")
+
+
+@pytest.mark.parametrize(
+    "kind, value, error, wrong, told, borderline",
+    [
+        ("gain", 3.0, 0.0, False, True, True),
+        ("gain", 3.1, 1.0, True, True, True),  # 3.1 standard errors
+        ("gain", 3.1, 1.3, False, True, True),  # 2.4; up to 5.7 %, of 6
+        ("gain", -3.1, 1.5, False, False, True),
+        ("gain", 2.2, 0.0, False, True, False),
+        ("gain", -4.1, 0.0, True, True, False),
+        ("gain", 0.0, float("inf"), False, False, False),
+        ("phase", 2.0, 1.0, False, True, False),
+        ("phase", 2.0, 1.2, False, False, False),  # up to 4.4, of 4.2
+        ("delay", 4.0, 1.0, False, False, False),  # four standard errors are not enough of a delay
+        ("delay", 5.1, 1.0, True, True, False),
+        ("friction", 0.0, 1.5, False, True, False),
+        ("friction", 0.0, 1.6, False, False, False),
+    ],
+)
+def test_what_is_clearly_wrong_and_what_the_log_leaves_open(
+    kind: str, value: float, error: float, wrong: bool, told: bool, borderline: bool
+) -> None:
+    """A band of 3: beyond it and 2.6 standard errors (of a delay 5) it is wrong."""
+    measure = Measure(kind, Off(value, error, "%"), 3.0)
+    assert (measure.wrong, measure.told, measure.borderline) == (wrong, told, borderline)
+    assert not replace(measure, by_chance=True).wrong
 
 
 def test_what_the_loop_that_was_logged_says_stands_whatever_the_choice() -> None:
