@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -318,6 +318,34 @@ def test_the_replay_by_hand() -> None:
     work = np.array([0.5, 2.5, 0.5, 0.5, 0.5, 0.5]) * MS
     assert replay(work, np.arange(6), MS).tolist() == [False, True, True, True, False, False]
     assert replay(work, np.array([0, 1, 4, 5, 6, 7]), MS).tolist() == [False, True, False, False, False, False]
+
+
+def test_the_models_live_through_periods_that_the_loop_discards() -> None:
+    """Of 8 samples 1 to 3 and the last two are discarded; what was asked for in between is kept."""
+    followed: list[object] = []
+    rows: list[list[float]] = []
+
+    def law(k: int, positions: Sequence[float], row: list[float], voltages: list[float]) -> None:
+        assert k < 100
+        row.append(10.0 * k)
+        voltages.append(k + positions[0])
+
+    def follow(acting: Sequence[float]) -> Sequence[float]:
+        followed.append(tuple(acting))
+        return [-1.0]
+
+    due = {0: 0, 1: 4, 5: 5, 6: 9}
+    loop = Loop(8, due.__getitem__, lambda: [0.5], [law], lambda v: [2 * v[0]], follow, rows.append, lambda k: None)
+    assert loop.run(1) is None and loop.k == 1
+    assert loop.run() is Ending.DONE and loop.k == 6
+    assert rows == [[0, 0.0, 1.0, -1.0], [4, 40.0, 9.0, -1.0], [5, 50.0, 11.0, -1.0]]
+    assert followed == [(1.0,), (), (), (), (9.0,), (11.0,), (), ()]
+    ended = replace(loop, k=5, finish=lambda k: Ending.STOPPED if k == 5 else None)
+    assert ended.run() is Ending.STOPPED and ended.k == 6
+    ended.k, ended.samples, ended.wait = 100, 200, lambda k: k
+    with pytest.raises(AssertionError):
+        ended.run()
+    assert ended.k == 100, "the sample that failed"
 
 
 @pytest.mark.parametrize("sets_references, stages", [(True, (2, 4)), (False, (0, 6))])
