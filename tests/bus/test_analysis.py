@@ -224,6 +224,16 @@ def test_answers_come_one_after_another_within_the_cycle(bitrate: int, axes: int
     assert [result.time for result in found] == [135 * bit * (place + 1) for place in range(axes + 1)]
 
 
+@pytest.mark.parametrize("period, often", [(1.0, 1), (3e-3, 1), (2e-3, 2)])
+def test_a_message_beside_the_cycle_is_reckoned_with_as_often_as_it_comes_in_three_periods(
+    period: float, often: int
+) -> None:
+    beside = Message("beside", 0x7FF, False, 8, period)
+    table = in_order([*messages_of(load_machine("mini-cnc"), 1e-3)[:4], beside])
+    found = responses(table, 1_000_000)
+    assert [result.time for result in found[1:4]] == [135_000 * (place + often) for place in (2, 3, 4)]
+
+
 def test_a_cycle_that_does_not_fit_is_not_called_met() -> None:
     """At 500 kbit/s five frames of 135 bits are 1.35 ms: the bus is overloaded from the third answer on."""
     found = responses(messages_of(load_machine("mini-cnc")), 500_000)
