@@ -141,6 +141,12 @@ def test_each_error_costs_its_frame_and_the_longest_frame_again() -> None:
     assert twice == [time + 2 * (31 + 135) * 1000 for time in plain]
 
 
+@pytest.mark.parametrize("interval, time", [(51, 51), (50, 92), (46, 92), (92, 51)])
+def test_an_error_may_strike_the_frame_itself(interval: int, time: int) -> None:
+    """It takes 10, an error 31 and the frame again: 51 with one. Within 51 there is a second one after 50."""
+    assert worst_response([Task(10, 1000)], 0, errors=Errors(1, interval * 1e-9)).time == time
+
+
 def test_errors_alone_can_overload_a_bus() -> None:
     table = in_order([Message("a", 1, False, 8, 1e-3)])
     assert responses(table, 1_000_000, errors=Errors(interval=1e-3))[0].time == (135 + 31 + 135) * 1000
