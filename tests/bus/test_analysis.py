@@ -102,6 +102,13 @@ def test_the_counterexample_to_the_analysis_of_1994() -> None:
     assert [slot.end - slot.released for slot in slots] == [3000, 3500]
 
 
+def test_what_blocks_the_first_instance_may_delay_the_second_more() -> None:
+    """Blocked by 1 and then 3 of the higher one, the first takes 5; the second waits for 3 more: until 9, from 3 on."""
+    tasks = [Task(3, 5), Task(1, 3), Task(1, 6)]
+    found = worst_response(tasks, 1)
+    assert (found.time, found.blocking, found.instance) == (6, 1, 1)
+
+
 def test_the_counterexample_as_frames() -> None:
     """The same as real messages: seven bytes with worst stuffing are 125 bits, 1 ms at 125 kbit/s."""
     table = in_order(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,9 +19,9 @@ from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.structures.structures import structure
 from rds.identification.validate.alternatives import with_alternatives
-from rds.identification.validate.assessment import assess
+from rds.identification.validate.assessment import Assessment, Range, assess
 from rds.identification.validate.candidate import as_candidate
-from rds.identification.validate.conclusion import overall
+from rds.identification.validate.conclusion import conclude, overall
 from rds.identification.validate.discrepancy import Off
 from rds.identification.validate.judge import judge
 from rds.identification.validate.same_data import overlap
@@ -423,6 +424,86 @@ def test_several_logs_are_as_valid_as_the_least_that_can_tell(words: str, word: 
     assert f"Beside that: {', '.join(others)}." in found.sentence if others else "Beside" not in found.sentence
     assert overall({"a": verdicts["a"]}) is verdicts["a"]
     assert overall(verdicts, (Reason(Side.NOTE, "contradiction", "so"),)).sentence.endswith("contradict each other.")
+
+
+def assessed(position: float = 95.0, velocity: float | None = None, closed: bool = False, **more: object) -> Assessment:
+    """What `conclude` looks at, of a log without findings: a free run that fits so many per cent."""
+    whole = {"velocity": Range((-10.0, 10.0), (-10.0, 10.0), "mm/s"), "command": Range((-8.0, 8.0), (-8.0, 8.0), "V")}
+    given = {
+        "free_run": SimpleNamespace(fit_percent=position),
+        "velocity": None if velocity is None else SimpleNamespace(fit_percent=velocity, rmse=1.0),
+        "log": SimpleNamespace(closed_loop=closed, sample_period=T),
+        "as_axis": None,
+        "as_motion": None,
+        "noise": 0.0,
+        "block": 1,
+        "ahead": {},
+        "naive": {},
+        "measured": np.zeros(9),
+        "voltage": None,
+        "ranges": whole,
+    }
+    return SimpleNamespace(**given | more)  # type: ignore[return-value]
+
+
+def foretold(rmse: float) -> dict[str, object]:
+    """Predictions two samples ahead, in which the axis goes on by 2; without a model they are off by as much."""
+    ahead, naive = {2: SimpleNamespace(rmse=rmse)}, {2: SimpleNamespace(rmse=2.0)}
+    return {"ahead": ahead, "naive": naive, "measured": np.arange(9.0)}
+
+
+SLOWER = {"velocity": Range((-4.0, 4.0), (-10.0, 10.0), "mm/s")}
+FASTER = {"velocity": Range((-12.0, 12.0), (-10.0, 10.0), "mm/s")}
+FORWARD = {"velocity": Range((-0.4, 10.0), (-10.0, 10.0), "mm/s")}
+BACKWARD = {"velocity": Range((-10.0, 0.4), (-10.0, 10.0), "mm/s")}
+NEEDED = SimpleNamespace(relative_percent=5.0)
+FOREIGN = "data-units"  # a finding about the log
+
+
+@pytest.mark.parametrize(
+    "a, reasons, word, purpose",
+    [
+        (assessed(), "", "valid", ""),
+        (assessed(), "against residual", "valid for", "simulating the speed"),
+        (assessed(95.0, 95.0), "against residual", "valid for", "simulating position and velocity"),
+        (assessed(95.0, 50.0), "against free-run-velocity", "valid for", "simulating the position"),
+        (assessed(50.0, 95.0), "against free-run", "valid for", "simulating the velocity"),
+        (assessed(50.0, 50.0), "", "not valid", ""),
+        (assessed(closed=True), "", "valid for", "simulating the speed in a closed loop such as this"),
+        (assessed(ranges=SLOWER), "", "valid for", "simulating the speed up to 4 mm/s"),
+        (assessed(ranges=FASTER), "", "valid for", "simulating the speed up to the 12 mm/s tried here"),
+        (assessed(ranges=FORWARD), "", "valid", ""),  # a spindle may turn one way
+        (assessed(95.0, 95.0, ranges=FORWARD), "", "valid for", "simulating position and velocity in one direction"),
+        (assessed(95.0, 95.0, ranges=BACKWARD), "", "valid for", "simulating position and velocity in one direction"),
+        (assessed(50.0, **foretold(0.19)), "", "valid for", "predicting 2 samples ahead"),
+        (assessed(50.0, **foretold(0.19)), "against voltage", "not valid", ""),
+        (assessed(50.0, **foretold(0.21)), "", "not valid", ""),
+        *((assessed(), f"against {kind}", "not valid", "") for kind in ("unstable", "sign", "unit", "gain", "loop")),
+        (assessed(), f"cannot tell {FOREIGN}", "cannot tell", ""),
+        (assessed(), f"cannot tell {FOREIGN}, against gain", "not valid", ""),
+        (assessed(), "cannot tell same-data, against gain", "not valid", ""),
+        (assessed(), "cannot tell little, against gain", "cannot tell", ""),
+        (assessed(50.0), "cannot tell gain-unidentifiable, against voltage, against ahead", "not valid", ""),
+        (assessed(50.0), "cannot tell gain-unidentifiable, against voltage", "cannot tell", ""),
+        (assessed(95.0), "cannot tell gain-unidentifiable, against voltage, against ahead", "cannot tell", ""),
+        (assessed(50.0), "cannot tell little, against voltage, against ahead", "cannot tell", ""),
+        (
+            assessed(50.0, closed=True),
+            "for forces",
+            "valid for",
+            "foretelling the force of a motion in a closed loop such as this",
+        ),
+        (assessed(50.0), "for forces", "not valid", ""),
+        (assessed(50.0, closed=True), "", "not valid", ""),
+        (assessed(50.0, closed=True, voltage=NEEDED), "", "cannot tell", ""),
+        (assessed(50.0, closed=True, voltage=NEEDED), "against voltage", "not valid", ""),
+        (assessed(50.0, voltage=NEEDED), "", "not valid", ""),
+    ],
+)
+def test_from_errors_and_reasons_to_the_word(a: Assessment, reasons: str, word: str, purpose: str) -> None:
+    said = [each.rsplit(" ", 1) for each in reasons.split(", ") if each]
+    given = [Reason(Side(side), kind, "so it is") for side, kind in said]
+    assert conclude(a, given, Bands()) == (word, purpose)
 
 
 @pytest.mark.parametrize(
