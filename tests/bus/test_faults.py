@@ -255,6 +255,7 @@ def test_an_unplugged_node_goes_error_passive_and_no_further() -> None:
     medium.offer("B", record(2), 0)
     drain(medium, SECOND)
     assert medium.stations["B"].counters.tec == 128 and medium.stations["A"].counters.rec == 0
+    assert medium.stations["B"].errors == 16, "more attempts would change nothing"
     medium.plug("B", SECOND)
     (delivery,) = drain(medium, 2 * SECOND)
     assert delivery.at == SECOND + 11_000 + frame_time(2, bitrate=MBIT), "it listens for eleven bits first"

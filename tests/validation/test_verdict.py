@@ -21,7 +21,7 @@ from rds.identification.structures.structures import structure
 from rds.identification.validate.alternatives import with_alternatives
 from rds.identification.validate.assessment import Assessment, Range, assess
 from rds.identification.validate.candidate import as_candidate
-from rds.identification.validate.conclusion import conclude, overall
+from rds.identification.validate.conclusion import conclude, overall, sentence_of
 from rds.identification.validate.discrepancy import Off
 from rds.identification.validate.judge import judge
 from rds.identification.validate.same_data import overlap
@@ -504,6 +504,38 @@ def test_from_errors_and_reasons_to_the_word(a: Assessment, reasons: str, word: 
     said = [each.rsplit(" ", 1) for each in reasons.split(", ") if each]
     given = [Reason(Side(side), kind, "so it is") for side, kind in said]
     assert conclude(a, given, Bands()) == (word, purpose)
+
+
+OWN = "Do not take its parameters for the axis's own: this log contradicts them."
+LACKS = "Its parameters may not be the axis's own: they may make up for something that it lacks."
+HELD = "That its parameters are the axis's own is not shown: see the predictions."
+
+
+@pytest.mark.parametrize(
+    "word, reasons, sentence",
+    [
+        ("valid", "", "M is valid for a.csv (up to 10 mm/s and 8 V)."),
+        ("cannot tell", "", "Cannot tell whether M is valid, from a.csv (up to 10 mm/s and 8 V)."),
+        ("not valid", "against ahead, for gain", "M is not valid for a.csv (up to 10 mm/s and 8 V)."),
+        ("not valid", "against gain, against delay", "M is not valid for a.csv (up to 10 mm/s and 8 V): gain; delay."),
+        ("valid for", "", "M is valid for braking only, by a.csv (up to 10 mm/s and 8 V)."),
+        *(
+            ("valid for", reasons, f"M is valid for braking only, by a.csv (up to 10 mm/s and 8 V). {more}")
+            for reasons, more in (
+                ("against parameters, against structure", OWN),
+                ("against structure, against structure-held", LACKS),
+                ("against structure-held", HELD),
+            )
+        ),
+        ("valid for", "for parameters", "M is valid for braking only, by a.csv (up to 10 mm/s and 8 V)."),
+    ],
+)
+def test_the_sentence_of_a_verdict(word: str, reasons: str, sentence: str) -> None:
+    said = [each.rsplit(" ", 1) for each in reasons.split(", ") if each]
+    given = [Reason(Side(side), kind, f"{kind}: so it is") for side, kind in said]
+    a = assessed(log=SimpleNamespace(name="a.csv"), frequency=0.0)
+    model = SimpleNamespace(name="M", parameters={})
+    assert sentence_of(model, a, Word(word), "braking", given) == sentence  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
