@@ -46,6 +46,14 @@ def test_without_friction_and_play_it_is_the_tracking_controller(axis):
     np.testing.assert_array_equal(ours, theirs)
 
 
+def test_before_the_first_motion_no_friction_is_compensated():
+    controller = made("feedforward", axis_model("X"), backlash=PLAY)
+    still, state = Reference(0.0, 0.0, 0.0), controller.initial_state
+    for _ in range(3):
+        u, state = controller.control(0.0, still, 0.0, state, controller.params)
+        assert u == 0.0
+
+
 def test_reversals_with_friction_leave_a_tenth_of_the_error():
     assert rms(made("feedforward", axis_model("X")), plant("X")) < 0.1 * rms(
         made("tracking", axis_model("X")), plant("X")

@@ -144,6 +144,7 @@ def test_rows_to_either_side_of_the_peak_of_an_acceleration_belong_together(tmp_
         ("time,value (desired)\n0,1\n1,2\n", 1, "give the value in mm or V, and a heading with that unit or none"),
         ("time_s,value (m)\n0,1\n1,2\n", 1, "the column 'value (m)' is in m; give the value in mm or V"),
         ("t,p,v [mm/s],a [m/s²]\n0,0,0,0\n1,0,0,0\n", 1, "give the acceleration in mm/s²"),
+        ("time,position_m\n0,1\n1,2\n", 1, "the column 'position_m' is in m; give the value in mm or V"),
         ("t/ms,u/V\n0,1\n500,2\n", 1, "the column 't/ms' is in ms; give the time in s"),
         ("value,time\n1,0\n", 1, "the first column is 'value'"),
         ("0,0,1,0\n1,1,1,0\n2,5,1,0\n", 3, "must belong together"),
