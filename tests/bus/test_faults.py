@@ -272,9 +272,10 @@ def test_a_plug_pulled_while_sending_is_an_error_for_the_others() -> None:
     assert [identifier_of(delivery) for delivery in drain(medium, 2 * SECOND)] == [1]
 
 
-def test_a_plug_pulled_while_another_sends_the_same_frame_disturbs_nobody() -> None:
+@pytest.mark.parametrize("senders", ["AB", "B"])
+def test_a_plug_pulled_while_another_sends_a_frame_or_the_same_disturbs_nobody(senders: str) -> None:
     medium = bus()
-    for name in "AB":
+    for name in senders:
         medium.offer(name, record(1, bytes(8)), 0)
     medium.take(50_000)
     medium.unplug("A", 50_000)
