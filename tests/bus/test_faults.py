@@ -266,8 +266,12 @@ def test_a_plug_pulled_while_sending_is_an_error_for_the_others() -> None:
     medium.offer("A", record(1, bytes(8)), 0)
     medium.take(50_000)
     medium.unplug("A", 50_000)
-    assert drain(medium, SECOND) == []
+    medium.offer("B", record(2), 50_000)
+    broken = (6 + 6 + 8 + 3) * 1000  # the sixth equal bit is the error, then come flag, delimiter, intermission
+    assert medium.take(50_000 + broken) is None
     assert [medium.stations[name].counters.rec for name in "BC"] == [1, 1]
+    (delivery,) = drain(medium, SECOND)
+    assert delivery.at == 50_000 + broken + frame_time(2, bitrate=MBIT)
     medium.plug("A", SECOND)
     assert [identifier_of(delivery) for delivery in drain(medium, 2 * SECOND)] == [1]
 
