@@ -253,6 +253,9 @@ def test_an_unplugged_node_goes_error_passive_and_no_further() -> None:
     medium = bus()
     medium.unplug("B", 0)
     medium.offer("B", record(2), 0)
+    attempt = frame_time(2, bitrate=MBIT) + (-8 + 14 + 3) * 1000  # to the ACK slot, an error frame, intermission
+    drain(medium, 7 * attempt // 2)
+    assert medium.stations["B"].counters.tec == 24
     drain(medium, SECOND)
     assert medium.stations["B"].counters.tec == 128 and medium.stations["A"].counters.rec == 0
     assert medium.stations["B"].errors == 16, "more attempts would change nothing"
