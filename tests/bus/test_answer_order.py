@@ -161,6 +161,19 @@ def test_what_follows_is_new_and_at_most_some_duplicates_ahead(at: int, ticks: i
     assert in_step(at).place(answer(at)) == Place.ASTRAY, "it comes twice, and no tick was sent meanwhile"
 
 
+@pytest.mark.parametrize("ticks", [1, 2])
+def test_one_that_follows_the_last_taken_shows_that_the_module_is_there(ticks: int) -> None:
+    """Be it the answer to the last tick or to the one before."""
+    order = in_step(1000, ticks)
+    for k in range(PERSISTENT - 1):
+        order.place(answer(30_000 + k))
+    assert order.place(answer(1001)) == Place.LAST
+    for k in range(SUSPECTED):
+        assert not order.is_another(silent=True)
+        order.place(answer(40_000 + k))
+    assert order.is_another(silent=True) and not order.is_another()
+
+
 @pytest.mark.parametrize("step, is_one", [(1, True), (DUPLICATES, True), (DUPLICATES + 1, False)])
 def test_answers_astray_that_follow_one_another_are_another_modules(step: int, is_one: bool) -> None:
     order = in_step(1000, 1)
