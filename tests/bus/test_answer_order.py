@@ -170,7 +170,7 @@ def test_one_that_follows_the_last_taken_shows_that_the_module_is_there(ticks: i
     assert order.place(answer(1001)) == Place.LAST
     for k in range(SUSPECTED):
         assert not order.is_another(silent=True)
-        order.place(answer(40_000 + k))
+        order.place(answer(30_000 + PERSISTENT - 1 + k))
     assert order.is_another(silent=True) and not order.is_another()
 
 
