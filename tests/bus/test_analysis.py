@@ -102,6 +102,13 @@ def test_the_counterexample_to_the_analysis_of_1994() -> None:
     assert [slot.end - slot.released for slot in slots] == [3000, 3500]
 
 
+def test_what_blocks_the_first_instance_may_delay_the_second_more() -> None:
+    """Blocked by 1 and then 3 of the higher one, the first takes 5; the second waits for 3 more: until 9, from 3 on."""
+    tasks = [Task(3, 5), Task(1, 3), Task(1, 6)]
+    found = worst_response(tasks, 1)
+    assert (found.time, found.blocking, found.instance) == (6, 1, 1)
+
+
 def test_the_counterexample_as_frames() -> None:
     """The same as real messages: seven bytes with worst stuffing are 125 bits, 1 ms at 125 kbit/s."""
     table = in_order(
@@ -139,6 +146,12 @@ def test_each_error_costs_its_frame_and_the_longest_frame_again() -> None:
     assert plain == [(135 + 55) * 1000, (135 + 55) * 1000]
     assert once == [time + (31 + 135) * 1000 for time in plain]
     assert twice == [time + 2 * (31 + 135) * 1000 for time in plain]
+
+
+@pytest.mark.parametrize("interval, time", [(51, 51), (50, 92), (46, 92), (92, 51)])
+def test_an_error_may_strike_the_frame_itself(interval: int, time: int) -> None:
+    """It takes 10, an error 31 and the frame again: 51 with one. Within 51 there is a second one after 50."""
+    assert worst_response([Task(10, 1000)], 0, errors=Errors(1, interval * 1e-9)).time == time
 
 
 def test_errors_alone_can_overload_a_bus() -> None:
@@ -222,6 +235,16 @@ def test_answers_come_one_after_another_within_the_cycle(bitrate: int, axes: int
     table = messages_of(load_machine("mini-cnc"), 1e-3)[: axes + 1]
     found = responses(table, bitrate)
     assert [result.time for result in found] == [135 * bit * (place + 1) for place in range(axes + 1)]
+
+
+@pytest.mark.parametrize("period, often", [(1.0, 1), (3e-3, 1), (2e-3, 2)])
+def test_a_message_beside_the_cycle_is_reckoned_with_as_often_as_it_comes_in_three_periods(
+    period: float, often: int
+) -> None:
+    beside = Message("beside", 0x7FF, False, 8, period)
+    table = in_order([*messages_of(load_machine("mini-cnc"), 1e-3)[:4], beside])
+    found = responses(table, 1_000_000)
+    assert [result.time for result in found[1:4]] == [135_000 * (place + often) for place in (2, 3, 4)]
 
 
 def test_a_cycle_that_does_not_fit_is_not_called_met() -> None:

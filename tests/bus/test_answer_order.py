@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.answer_order import DUPLICATES, PERSISTENT, SUSPECTED, AnswerOrder, Place
 from rds.bus.modules.rds.drivers import AxisDrivers
-from rds.bus.modules.rds.frames import Answer, Kind, Status
+from rds.bus.modules.rds.frames import COUNT_TURNS, Answer, Kind, Status
 from rds.core.errors import MachineError
 from rds.machines import load_machine
 
@@ -132,3 +133,90 @@ def test_a_module_in_the_place_of_another_that_falls_silent_is_still_named() -> 
         with pytest.raises(MachineError, match="has restarted, or was replaced"):
             for _ in range(120):
                 drivers.exchange()
+
+
+# --- the order itself, answer by answer
+
+
+def answer(ticks: int) -> Answer:
+    return Answer(0, Status.ENABLED, Kind.ANSWER, ticks % COUNT_TURNS)
+
+
+def in_step(at: int, ticks: int = 0) -> AnswerOrder:
+    """The answer to tick `at` was taken, and so many more are sent."""
+    order = AnswerOrder()
+    order.tick()
+    assert order.place(answer(at)) == Place.LAST and order.take(answer(at)) == 0, "the first may say any count"
+    for _ in range(ticks):
+        order.tick()
+    return order
+
+
+@pytest.mark.parametrize("at", [0, 1000, COUNT_TURNS - 2, COUNT_TURNS - 66])
+@pytest.mark.parametrize("ticks", [1, 3])
+def test_what_follows_is_new_and_at_most_some_duplicates_ahead(at: int, ticks: int) -> None:
+    most = ticks + DUPLICATES
+    for further, place in ((0, "ASTRAY"), (1, "LAST"), (ticks, "LAST"), (most, "LAST"), (most + 1, "ASTRAY")):
+        assert in_step(at, ticks).place(answer(at + further)) == Place[place]
+    assert in_step(at).place(answer(at)) == Place.ASTRAY, "it comes twice, and no tick was sent meanwhile"
+
+
+@pytest.mark.parametrize("ticks", [1, 2])
+def test_one_that_follows_the_last_taken_shows_that_the_module_is_there(ticks: int) -> None:
+    """Be it the answer to the last tick or to the one before."""
+    order = in_step(1000, ticks)
+    for k in range(PERSISTENT - 1):
+        order.place(answer(30_000 + k))
+    assert order.place(answer(1001)) == Place.LAST
+    for k in range(SUSPECTED):
+        assert not order.is_another(silent=True)
+        order.place(answer(30_000 + PERSISTENT - 1 + k))
+    assert order.is_another(silent=True) and not order.is_another()
+
+
+@pytest.mark.parametrize("step, is_one", [(1, True), (DUPLICATES, True), (DUPLICATES + 1, False)])
+def test_answers_astray_that_follow_one_another_are_another_modules(step: int, is_one: bool) -> None:
+    order = in_step(1000, 1)
+    for k in range(1, PERSISTENT + 1):
+        for _ in range(2):  # one that comes twice says nothing
+            assert order.place(answer(30_000 + k * step)) == Place.ASTRAY
+        assert order.is_another() == (is_one and k >= PERSISTENT)
+        assert order.is_another(silent=True) == (is_one and k >= SUSPECTED)
+    assert order.place(answer(1001)) == Place.LAST and not order.is_another(silent=True), "it is still there"
+    for k in range(2):
+        order.place(answer(30_000 + k))
+    assert not order.is_another(silent=True), "they are counted anew"
+    order.take(answer(1001))
+    order.place(answer(30_002))
+    assert not order.is_another(silent=True)
+
+
+def test_a_doubtful_answer_is_of_a_slow_module_or_of_one_that_lost_a_tick() -> None:
+    """The answer to tick 1001 came where that to 1002 was due; what comes next tells which it was."""
+
+    def doubtful() -> AnswerOrder:
+        order = in_step(1000, 2)
+        assert order.place(answer(1001)) == Place.LAST
+        order.take_doubtful(answer(1001))
+        assert (order.expected, order.behind, order.owed) == (1001, 1, 1)
+        return order
+
+    lost = doubtful()
+    lost.tick()
+    assert lost.place(answer(1002)) == Place.LAST and lost.take(answer(1002)) == 1
+    slow = doubtful()
+    slow.tick()
+    slow.tick()  # 1003 in its count, 1004 in the host's
+    assert slow.place(answer(1002)) == Place.EARLIER and slow.owed == 0
+    assert slow.place(answer(1003)) == Place.LAST
+    assert slow.place(answer(1004)) == Place.LAST and slow.take(answer(1004)) == 0
+    for ticks, owed, gives, expected, behind in ((1001, 0, 0, 1001, 1), (1002, 0, 0, 1002, 0), (1003, 0, -1, 1003, 0)):
+        between = doubtful()  # two periods
+        assert between.straggler(answer(ticks)) == gives
+        assert (between.owed, between.expected, between.behind) == (owed, expected, behind)
+    still = doubtful()
+    assert still.straggler(answer(1000)) == 0 and (still.owed, still.expected) == (1, 1001)
+    still.tick()
+    still.tick()
+    still.take_doubtful(answer(1002))
+    assert still.behind == 2, "ever further behind"

@@ -143,6 +143,16 @@ def test_every_frame_is_within_its_bounds(identifier: tuple[int, bool], data: by
     assert least.total <= bits.total <= most.total
 
 
+@pytest.mark.parametrize("extended", [False, True])
+@pytest.mark.parametrize("size", FD_SIZES)
+def test_the_bit_rate_switch_changes_no_number_of_bits(size: int, extended: bool) -> None:
+    """The slow ones are those to BRS, with a stuff bit after every fourth but the first, and the last nine."""
+    before = 36 if extended else 17
+    least, most = least_bits(size, extended, True, True), most_bits(size, extended, True, True)
+    assert (least.total, most.total) == (least_bits(size, extended, True).total, most_bits(size, extended, True).total)
+    assert (least.nominal, most.nominal) == (before + 9, before + (before - 2) // 4 + 9)
+
+
 @pytest.mark.parametrize("size", range(9))
 def test_published_bounds_of_classic_frames(size: int) -> None:
     assert (shortest(size), longest(size)) == (47 + 8 * size, 55 + 10 * size)

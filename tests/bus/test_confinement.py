@@ -67,9 +67,11 @@ def test_the_rules_for_receivers() -> None:
     for _ in range(127):
         one.failed_to_receive()
     assert one.state is ErrorState.ACTIVE
-    for _ in range(10):
+    one.failed_to_receive()
+    assert (one.rec, one.state) == (128, ErrorState.PASSIVE)
+    for _ in range(200):
         one.failed_to_receive()
-    assert (one.rec, one.state) == (137, ErrorState.PASSIVE)
+    assert one.rec == 255, "the counter has eight bits"
     one.received()
     assert (one.rec, one.state) == (127, ErrorState.ACTIVE)
     one.received()
@@ -127,6 +129,24 @@ def test_one_error_and_the_frame_again() -> None:
     assert delivery.at == broken + frame_time(0x555, data, bitrate=MBIT)
     assert counters(medium, "A", "B", "C") == [(7, 0), (0, 0), (0, 0)]
     assert medium.errors == 1 and medium.stations["A"].errors == 1 and medium.stations["A"].sent == 1
+
+
+@pytest.mark.parametrize("passive, unplugged, answered", [("B", "", True), ("BC", "", False), ("B", "C", False)])
+def test_an_error_active_node_on_the_bus_answers_an_error_flag(passive: str, unplugged: str, answered: bool) -> None:
+    medium = bus()
+    for name in passive:
+        medium.stations[name].counters.rec = 128
+        medium.stations[name].counters.state = ErrorState.PASSIVE
+    for name in unplugged:
+        medium.unplug(name, 0)
+    data = b"\x55" * 8
+    string = bit_string(0x555, data)
+    bit = string.field("data 3").start
+    corrupt(medium, 1, bit=bit)
+    medium.offer("A", record(0x555, data), 0)
+    others = (4 if string.bits[bit] == "1" else 6) if answered else 0
+    (delivery,) = drain(medium, 10**9)
+    assert delivery.at == len(string.broken_off(bit, others)) * BIT + frame_time(0x555, data, bitrate=MBIT)
 
 
 def test_up_to_error_passive_and_back() -> None:
@@ -234,7 +254,7 @@ def test_alone_on_the_bus_nobody_acknowledges() -> None:
     medium.take(10**9)
     assert counters(medium, "A") == [(128, 0)]
     failed = medium.stations["A"].errors
-    assert failed == 16 + (10**9 - 16 * attempt - 8 * BIT) // (attempt + 8 * BIT)
+    assert failed == 16 + (10**9 - 16 * attempt - 8 * BIT) // (attempt + 8 * BIT) == medium.errors
     medium.join("B", Station(2, "B"), 10**9)
     (delivery,) = drain(medium, 2 * 10**9)
     assert delivery.at < 10**9 + 2 * (attempt + 8 * BIT) + whole

@@ -241,10 +241,10 @@ def test_a_fault_with_a_time_strikes_while_it_lasts(medium: Medium[str]) -> None
 def test_an_unplugged_node_hears_nothing_and_what_it_sends_waits(medium: Medium[str]) -> None:
     hand = Hand(medium)
     hand.inject("unplug", node="B", duration=1.0)
-    medium.offer("A", record(1), 0)
-    medium.offer("B", record(2), 0)
-    assert heard(medium, SECOND // 2) == [(1, "C")]
-    assert heard(medium, 2 * SECOND) == [(2, "AC")]
+    medium.offer("A", record(2), 0)
+    medium.offer("B", record(1), 0)  # it would win, but takes no part
+    assert heard(medium, SECOND // 2) == [(2, "C")]
+    assert heard(medium, 2 * SECOND) == [(1, "AC")]
     medium.offer("A", record(3), 2 * SECOND)
     assert heard(medium, 3 * SECOND) == [(3, "BC")]
 
@@ -253,8 +253,12 @@ def test_an_unplugged_node_goes_error_passive_and_no_further() -> None:
     medium = bus()
     medium.unplug("B", 0)
     medium.offer("B", record(2), 0)
+    attempt = frame_time(2, bitrate=MBIT) + (-8 + 14 + 3) * 1000  # to the ACK slot, an error frame, intermission
+    drain(medium, 7 * attempt // 2)
+    assert medium.stations["B"].counters.tec == 24
     drain(medium, SECOND)
     assert medium.stations["B"].counters.tec == 128 and medium.stations["A"].counters.rec == 0
+    assert medium.stations["B"].errors == 16, "more attempts would change nothing"
     medium.plug("B", SECOND)
     (delivery,) = drain(medium, 2 * SECOND)
     assert delivery.at == SECOND + 11_000 + frame_time(2, bitrate=MBIT), "it listens for eleven bits first"
@@ -265,10 +269,25 @@ def test_a_plug_pulled_while_sending_is_an_error_for_the_others() -> None:
     medium.offer("A", record(1, bytes(8)), 0)
     medium.take(50_000)
     medium.unplug("A", 50_000)
-    assert drain(medium, SECOND) == []
+    medium.offer("B", record(2), 50_000)
+    broken = (6 + 6 + 8 + 3) * 1000  # the sixth equal bit is the error, then come flag, delimiter, intermission
+    assert medium.take(50_000 + broken) is None
     assert [medium.stations[name].counters.rec for name in "BC"] == [1, 1]
+    (delivery,) = drain(medium, SECOND)
+    assert delivery.at == 50_000 + broken + frame_time(2, bitrate=MBIT)
     medium.plug("A", SECOND)
     assert [identifier_of(delivery) for delivery in drain(medium, 2 * SECOND)] == [1]
+
+
+@pytest.mark.parametrize("senders", ["AB", "B"])
+def test_a_plug_pulled_while_another_sends_a_frame_or_the_same_disturbs_nobody(senders: str) -> None:
+    medium = bus()
+    for name in senders:
+        medium.offer(name, record(1, bytes(8)), 0)
+    medium.take(50_000)
+    medium.unplug("A", 50_000)
+    (delivery,) = drain(medium, SECOND)
+    assert (delivery.at, medium.errors) == (frame_time(1, bytes(8), bitrate=MBIT), 0)
 
 
 def test_a_dead_node_says_no_more(medium: Medium[str]) -> None:

@@ -144,6 +144,14 @@ def test_backlash_is_lost_at_a_reversal() -> None:
     assert axis.output() < highest
 
 
+def test_a_command_does_not_act_before_its_delay_is_over() -> None:
+    axis = MachineAxis(MachineParameters(tau=0.01, K=2.0, delay=0.5))
+    axis.command(5.0, at=0.0)
+    assert (axis.advance(0.25), axis.now, axis.voltage) == (0.0, 0.25, 0.0)
+    assert (axis.advance(0.5), axis.now, axis.voltage) == (0.0, 0.5, 5.0)
+    assert axis.advance(0.51) > 0.0
+
+
 def test_a_command_acts_its_delay_later_and_a_cut_at_once() -> None:
     p = MachineParameters(tau=0.01, K=2.0, delay=0.003)
     axis = MachineAxis(p)

@@ -86,6 +86,17 @@ def test_what_is_offered_in_the_interframe_space_takes_part(late: int) -> None:
     assert order == ([1, 0x10, 0x20] if late <= 3000 else [1, 0x20, 0x10])
 
 
+def test_who_may_not_send_yet_keeps_nobody_waiting() -> None:
+    for waiting, other in ("AC", "CA"):
+        medium = bus()
+        medium.stations[waiting].resume_at = 500_000
+        medium.offer(waiting, record(1), 0)
+        medium.offer(other, record(2), 0)
+        arrived = [(delivery.at, delivery.sender) for delivery in drain(medium, 10**9)]
+        first, second = (frame_time(identifier, bitrate=MBIT) for identifier in (2, 1))
+        assert arrived == [(first, other), (500_000 + second, waiting)]
+
+
 def test_a_frame_in_flight_is_not_interrupted() -> None:
     offers = [Offer(0, "A", record(0x7FF, bytes(8))), Offer(1, "B", record(0))]
     assert [identifier for _, identifier in carry(bus(), offers)] == [0x7FF, 0]

@@ -34,6 +34,7 @@ def home(rig: Rig, method: int, offset: int = 0) -> float:
             break
     assert rig.read(0x6041) & (DONE | MODE_13) == DONE
     assert rig.drive.state is State.OPERATION_ENABLED
+    assert abs(rig.drive.servo.axis.velocity) < 1e-6, "it has ended at rest"
     return (rig.drive.servo.zero - offset) * 0.001
 
 

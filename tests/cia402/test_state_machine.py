@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.bus.modules.cia402.codes import STATUS_PATTERNS, State, state_of, status_text
-from rds.bus.modules.cia402.state_machine import TRANSITIONS, StateMachine
+from rds.bus.modules.cia402.state_machine import TRANSITIONS, Command, StateMachine, command
 
 WAYS = {tuple(way) for way in State402.TRANSITIONTABLE}
 # not in the library's table: quick stop without power (7, 10), and 3 with 4 in one command
@@ -21,6 +21,30 @@ steps = st.one_of(
     st.sampled_from([0x06, 0x07, 0x0F, 0x02, 0x00, 0x80]).map(lambda word: ("control", word)),
     st.sampled_from([("fault", 0), ("reacted", 0), ("stopped", 0), ("wake", 0)]),
 )
+
+
+# CiA 402, command coding: (bits that matter, what they are) of bits 7 and 3 to 0
+CODING = {
+    Command.SHUTDOWN: (0x87, 0x06),
+    Command.SWITCH_ON: (0x8F, 0x07),
+    Command.ENABLE_OPERATION: (0x8F, 0x0F),
+    Command.DISABLE_VOLTAGE: (0x82, 0x00),
+    Command.QUICK_STOP: (0x86, 0x02),
+    Command.NONE: (0x80, 0x80),
+}
+
+
+def test_every_controlword_is_one_command() -> None:
+    for word in [*range(0x100), *range(0xFF00, 0x10000)]:
+        assert [name for name, (mask, bits) in CODING.items() if word & mask == bits] == [command(word)], hex(word)
+
+
+def test_enabling_at_once_makes_two_transitions_and_a_quick_stop_that_has_ended_one() -> None:
+    machine = StateMachine()
+    assert machine.wake() == [1] and machine.control(0x06) == [2] and machine.control(0x0F) == [3, 4]
+    assert machine.stopped() == [] and machine.control(0x02) == [11]
+    assert machine.control(0x0F) == [], "it may not be resumed"
+    assert machine.stopped() == [12] and machine.state is State.SWITCH_ON_DISABLED
 
 
 @given(st.lists(steps, max_size=60), st.booleans())
@@ -72,6 +96,9 @@ def test_a_fault_is_reset_by_a_rising_edge_only() -> None:
     machine.fault()
     machine.reacted()
     assert not machine.control(0x80)  # set before
+    assert not machine.control(0x00)
+    assert not machine.control(0x80, may_reset=False)
+    assert not machine.control(0x80), "the edge came while nothing could be reset"
     assert not machine.control(0x00)
     assert machine.control(0x80) == [15]
     assert machine.state is State.SWITCH_ON_DISABLED

@@ -46,6 +46,25 @@ def test_without_friction_and_play_it_is_the_tracking_controller(axis):
     np.testing.assert_array_equal(ours, theirs)
 
 
+def test_before_the_first_motion_no_friction_is_compensated():
+    controller = made("feedforward", axis_model("X"), backlash=PLAY)
+    still, state = Reference(0.0, 0.0, 0.0), controller.initial_state
+    for _ in range(3):
+        u, state = controller.control(0.0, still, 0.0, state, controller.params)
+        assert u == 0.0
+
+
+def test_the_mirrored_motion_takes_the_mirrored_voltage_from_the_first_sample_on():
+    model = axis_model("X") | {"friction_plus": 0.4, "friction_minus": -0.4}
+    controller, sine = made("feedforward", model, backlash=PLAY), circle_axis(3000)
+    there = back = controller.initial_state
+    for row in np.column_stack(sine).tolist():
+        y, mirrored = 0.99 * row[0], Reference(*(-value for value in row))
+        u, there = controller.control(0.0, Reference(*row), y, there, controller.params)
+        opposite, back = controller.control(0.0, mirrored, -y, back, controller.params)
+        assert u == -opposite != 0.0
+
+
 def test_reversals_with_friction_leave_a_tenth_of_the_error():
     assert rms(made("feedforward", axis_model("X")), plant("X")) < 0.1 * rms(
         made("tracking", axis_model("X")), plant("X")

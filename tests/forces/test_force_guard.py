@@ -80,6 +80,23 @@ def test_the_guard_looks_as_far_ahead_as_a_ramp_takes():
     assert guarding.allowed(first, 1.0) < (0.5) ** (1 / 0.75)
 
 
+def test_a_rate_above_one_keeps_the_limits_too_and_rises_in_steps():
+    """0.97 s^(-1/α) of shares s below one; 0.88 after 0.90 would allow 3 % more, which is less than a step of 5 %."""
+    share = np.array([0.90, 0.88, 0.80, 0.0])
+    guarding = ForceGuard(share, share, 0.75).start(1.0)  # so long a sample that none is seen ahead
+    found = [guarding.allowed(place, 1.0) for place in range(4)]
+    assert found == pytest.approx([0.97 * 0.9 ** (-1 / 0.75)] * 2 + [0.97 * 0.8 ** (-1 / 0.75), 2.0])
+
+
+@pytest.mark.parametrize("said, factor", [(0.0, 1.0), (None, 0.7), (60.0, 1.2), (1e9, 20.0)])
+def test_a_machines_cell_lowers_the_rate_only(said, factor):
+    """One that has said nothing yet is simulated, here with 0.7 of the law; 20 times the law is the most it may say."""
+    guarding = ForceGuard(np.full(9, 50.0), np.full(9, 0.5), 0.75, hardness=0.7).start(0.01, lambda: said)
+    for _ in range(200):
+        guarding.allowed(0, 1.0)
+    assert guarding.factor == pytest.approx(factor)
+
+
 def test_a_cut_without_limits_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"the cut has no \[limits\]"):
         part(tmp_path)

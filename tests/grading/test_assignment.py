@@ -96,20 +96,31 @@ def test_the_line_is_that_of_the_right_table_of_several(tmp_path: Path) -> None:
         read_assignment(assignment_in(tmp_path, text))
 
 
+SECOND = RMS.replace('"rms"', '"b"')
+
+
 @pytest.mark.parametrize(
     "more, said",
     [
         (RMS, "given to two criteria"),
         (SINE, "given to two cases"),
         (SINE.replace('"sine"', '"unused"'), "used by no criterion"),
-        (RMS.replace('"rms"', '"b"') + 'requires = ["c"]\n', "no criterion; there are rms, b"),
-        (RMS.replace('"rms"', '"b"') + 'requires = ["b"]\n', "the criterion itself"),
-        (RMS.replace('"rms"', '"b"').replace("rms-error", "noise-error"), "needs a case with noise"),
-        (RMS.replace('"rms"', '"b"').replace("rms-error", "model-fit"), "is for model assignments"),
-        (RMS.replace('"rms"', '"b"').replace("rms-error", "unit-tests"), "need no case"),
-        (RMS.replace('"rms"', '"b"').replace("rms-error", "path-followed"), "tolerance is missing"),
-        (RMS.replace('"rms"', '"b"') + "from = -1.0\n", "at least 0"),
-        (RMS.replace('"rms"', '"b"') + "partial = 2.0\n", "from 0 to 1"),
+        (SECOND + 'requires = ["c"]\n', "no criterion; there are rms, b"),
+        (SECOND + 'requires = ["b"]\n', "the criterion itself"),
+        (SECOND + "requires = [1]\n", "must be a list of the names of criteria"),
+        (SECOND + "requires = 1\n", "must be a list of the names of criteria"),
+        (SECOND.replace("rms-error", "noise-error"), "needs a case with noise"),
+        (SECOND.replace("rms-error", "model-fit"), "is for model assignments"),
+        (SECOND.replace("rms-error", "unit-tests"), "need no case"),
+        (
+            SECOND.replace("rms-error", "unit-tests").replace('case = "sine"\n', ""),
+            "it has no test",
+        ),
+        (SECOND.replace('case = "sine"', "cases = []"), "must be a list of the names of cases"),
+        (SECOND + 'cases = ["sine"]\n', "give one of them"),
+        (SECOND.replace("rms-error", "path-followed"), "tolerance is missing"),
+        (SECOND + "from = -1.0\n", "at least 0"),
+        (SECOND + "partial = 2.0\n", "from 0 to 1"),
     ],
 )
 def test_tables_that_do_not_go_together(more: str, said: str, tmp_path: Path) -> None:

@@ -56,6 +56,24 @@ def test_each_day_that_has_begun_costs_up_to_the_cap(hours: float, lost: float) 
     assert late.lost(hours / 24.0) == pytest.approx(lost)
 
 
+@pytest.mark.parametrize(
+    "hours, left, spent, lost",
+    [
+        (1.0, None, 0, 0.0),
+        (1.01, None, 1, 0.0),
+        (48.0, None, 2, 0.0),
+        (48.1, None, 2, 0.1),
+        (72.0, 1, 1, 0.2),
+        (72.0, 0, 0, 0.3),
+        (168.0, 9, 2, 0.5),
+        (168.1, None, 0, 1.0),  # nothing is left, so none is spent
+    ],
+)
+def test_free_days_are_spent_where_they_help(hours: float, left: int | None, spent: int, lost: float) -> None:
+    late = LateRules(percent_per_day=10.0, grace_hours=1.0, zero_after_days=7.0, free_days=2)
+    assert (late.spent(hours / 24.0, left), late.lost(hours / 24.0, left)) == (spent, pytest.approx(lost))
+
+
 def test_lateness_knows_time_zones() -> None:
     due = datetime(2026, 11, 30, 23, 59, tzinfo=timezone(timedelta(hours=1)))
     assert days_late(due, datetime(2026, 11, 30, 22, 59, tzinfo=UTC)) == 0.0
@@ -75,11 +93,14 @@ def test_what_comes_in_to_the_second_costs_no_day(minutes: int) -> None:
 def test_an_extension_ends_to_the_second(extension: float) -> None:
     due = datetime(2026, 11, 30, 23, 59, tzinfo=UTC)
     days = moved(days_late(due, due + timedelta(days=1 + extension)), extension)
-    assert days == 1.0 and LateRules(percent_per_day=10.0).lost(days) == 0.1
+    late = LateRules(percent_per_day=10.0)
+    assert days == 1.0 and late.lost(days) == late.lost(1e-6) == 0.1
 
 
 def test_a_late_table_is_read_strictly() -> None:
-    assert read_late_rules(TomlTable({"percent_per_day": 5}, LATE)) == LateRules(percent_per_day=5.0)
+    late = read_late_rules(TomlTable({"percent_per_day": 5, "free_days": 2}, LATE))
+    assert late == LateRules(percent_per_day=5.0, free_days=2)
+    assert read_late_rules(TomlTable(dict(late.to_table()), LATE)) == late and "zero_after_days" not in late.to_table()
     with pytest.raises(InputError, match="did you mean 'percent_per_day'"):
         read_late_rules(TomlTable({"percent_a_day": 5}, LATE))
     with pytest.raises(InputError, match="from 0 to 100"):

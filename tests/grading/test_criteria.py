@@ -69,13 +69,25 @@ def test_a_step_downwards_is_measured_as_one_upwards() -> None:
         assert measured(kind, down) == measured(kind, response(position))
 
 
+def test_a_step_later_and_from_elsewhere_is_measured_as_one_from_zero_at_the_start() -> None:
+    first = response(1.0 - np.exp(-TIME / TAU) * np.cos(30.0 * TIME))
+    late = np.r_[np.full(500, 2.0), 2.0 + 3.0 * first.result["X_measured"]]
+    reference = np.r_[np.full(500, 2.0), np.full(N, 5.0)]
+    step = {"from": 500 * T, "until": (500 + N) * T}
+    for more in (0, 9):  # whatever comes then does not count
+        columns = {"X_reference": np.r_[reference, np.full(more, -7.0)], "X_measured": np.r_[late, np.full(more, 9.0)]}
+        for kind in ("overshoot", "rise-time", "settling-time"):
+            assert measured(kind, run_of(columns), **step) == pytest.approx(measured(kind, first), rel=1e-9)
+
+
 def test_what_never_rises_or_settles_has_no_value() -> None:
     with pytest.raises(NotMeasured, match="never reaches"):
         measured("rise-time", response(np.minimum(TIME, 0.5)))
     with pytest.raises(NotMeasured, match="has not settled"):
         measured("settling-time", response(np.full(N, 0.5) + 0.5 * np.sin(TIME)))
-    with pytest.raises(NotMeasured, match="no step"):
-        measured("overshoot", run_of({"X_reference": TIME, "X_measured": TIME}))
+    for changing in (TIME, np.where(np.arange(N) < 2, 0.5, 1.0)):
+        with pytest.raises(NotMeasured, match="no step"):
+            measured("overshoot", run_of({"X_reference": changing, "X_measured": 0.0 * TIME}))
 
 
 def test_steady_state_error_is_the_mean_of_the_end() -> None:

@@ -15,6 +15,7 @@ from rds.grading.assignment.trusted import TrustedFiles
 from rds.grading.batch.grade_one import Opened
 from rds.grading.criteria.law_fit import LawFit
 from rds.grading.criteria.linear import LinearLoop, NoLoop, closed
+from rds.grading.criteria.pushed import begin_of, force, free_stretch
 from rds.identification.robustness.margins import linear_law, loop_margins
 from rds.models import library_model
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
@@ -70,6 +71,8 @@ def test_margins_from_outside_are_those_from_within(law: str, plant: str, tmp_pa
     assert found.margins[1] == pytest.approx(phase, abs=0.1)
     assert found.margins[2] == pytest.approx(modulus, abs=2e-3)
     assert abs(found.poles[0]) == pytest.approx(radius, abs=2e-5)
+    w, locus = found.locus(1024)
+    assert len(w) == len(locus) >= 512 and w[-1] == pytest.approx(np.pi / 0.001)
 
 
 def test_damping_of_proportional_control_is_that_of_its_second_order_loop(tmp_path: Path) -> None:
@@ -121,3 +124,60 @@ def test_a_loop_that_grows_within_a_few_samples_has_no_margins(gain: float) -> N
     found = closed(fit, library_model("linear-axis", tau=0.01, K=1.7), 1e-3)
     assert isinstance(found, NoLoop)
     assert found.is_known
+
+
+@pytest.mark.parametrize(
+    "gain, why, is_known",
+    [(-0.40, "", True), (-0.20, "takes longer than 16.4 s to die down", False), (1e-3, "does not die down", True)],
+)
+def test_a_deviation_must_die_down_to_a_thousandth_within_16_seconds(gain: float, why: str, is_known: bool) -> None:
+    """A slow loop goes as exp(K gain t): at 16 s to 2e-5 and 4e-3 of its largest, and upwards."""
+    fit = LawFit(np.array([1.0]), np.array([gain]), 0.0)
+    found = closed(fit, library_model("linear-axis", tau=0.01, K=1.7), 1e-3)
+    if isinstance(found, NoLoop):
+        assert why and why in found.why and found.is_known == is_known
+    else:
+        assert not why and len(found.position) == 1 << 14
+        assert abs(found.position[-1] / found.position.max()) == pytest.approx(np.exp(1.7 * gain * 16.4), rel=0.2)
+
+
+WAVE = 3.0 * np.sin(0.1 * np.arange(1000.0))  # V, of a converter of 10 V
+
+
+@pytest.mark.parametrize(
+    "at_limit, expected",
+    [
+        (slice(0, 0), (0, 1000)),
+        (slice(0, 300), (300, 1000)),
+        (slice(700, 1000), (0, 700)),
+        (slice(299, 300), (0, 1000)),  # a spike: what goes before it counts
+        (slice(700, 701), (0, 1000)),
+        (slice(0, 800), (0, 1000)),  # what is left is less than a fourth
+    ],
+)
+def test_the_force_acts_where_the_law_is_at_no_limit(at_limit: slice, expected: tuple[int, int]) -> None:
+    command = WAVE.copy()
+    command[at_limit] = 9.01
+    assert free_stretch(command, np.arange(1000.0), 10.0) == expected
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_a_limit_of_the_laws_own_is_a_voltage_held_while_the_axis_moves(moves: bool) -> None:
+    command = WAVE.copy()
+    command[:400] = 4.0
+    position = np.arange(1000.0) * moves
+    assert free_stretch(command, position, 10.0) == ((399, 1000) if moves else (0, 1000))
+
+
+def test_the_force_overcomes_the_friction_and_leaves_the_law_its_range() -> None:
+    """0.25 V hold the axis; beside that 0.4 to 1.2 times 8 % of 10 V; where 0.1 V are left, 1 % of the range."""
+    model = library_model("linear-axis", tau=0.01, K=2.0, friction_plus=0.5, friction_minus=-0.2)
+    command = np.where(np.arange(3000) < 1500, 0.0, 8.9)
+    made = force(model, command, (10.0, 10.0), (100, 2900), 1)
+    assert begin_of((0, 3000), 3000) == 60 and begin_of((100, 2900), 3000) == 100
+    assert not made[:100].any() and made[100:2900].all() and not made[2900:].any()
+    free, tight = np.abs(made[100:1400]), np.abs(made[1500:2900])
+    assert 0.25 + 0.32 <= free.min() < 0.65 and 1.1 < free.max() <= 0.25 + 0.96
+    assert tight == pytest.approx(0.1)
+    assert np.diff(np.flatnonzero(np.diff(np.abs(made[100:1400])))).min() >= 4
+    assert (made > 0.0).any() and (made < 0.0).any()

@@ -76,6 +76,14 @@ def test_one_sample_is_exact(p: dict[str, float], x: float, v: float, u: float, 
     assert close(ours, exact(x, v, u, T, p), size(x, v, u, T, p))
 
 
+@given(p=parameters(), x=floats(-100, 100), v=SPEEDS, u=VOLTAGES, T=PERIODS)
+def test_a_part_of_a_sample_in_a_loop_is_exact_too(p: dict[str, float], x: float, v: float, u: float, T: float) -> None:
+    motion = LinearAxisMotion(make(**p), 1e-3)
+    motion.position, motion.velocity = x, v
+    motion.move(u, T)
+    assert close((motion.read(), motion.velocity), exact(x, v, u, T, p), 10 * size(x, v, u, T, p))
+
+
 @settings(max_examples=300, deadline=None)
 @given(p=parameters(), x=floats(-10, 10), v=SPEEDS, u=VOLTAGES, T=PERIODS, share=floats(0.01, 0.99))
 def test_a_sample_is_the_sum_of_its_parts(

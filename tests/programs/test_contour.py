@@ -83,6 +83,13 @@ def test_a_point_of_the_path_is_not_off_it(segment: np.ndarray, share: float) ->
     assert found[0] < 1e-9
 
 
+def test_a_point_opposite_to_an_arc_is_as_far_as_its_nearer_end() -> None:
+    quarter = chain(arc((10, 0, 0), (0, 10, 0), (0, 0), 10.0))
+    points = np.array([[-10.0, 0.0, 0.0], [0.0, -10.0, 0.0], [0.0, -10.0, 3.0]])
+    found, _ = contour_error(points, quarter, np.zeros(3, int), np.full(3, 100.0))
+    assert np.abs(found - np.sqrt([200.0, 200.0, 209.0])).max() < 1e-12
+
+
 def test_only_the_path_near_the_motion_counts() -> None:
     """A second pass beside the first, 0.1 mm away: each measured point belongs to its own pass."""
     there, back = line((0, 0, 0), (50, 0, 0), 10.0), line((50, 0.1, 0), (0, 0.1, 0), 10.0)

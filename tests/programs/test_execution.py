@@ -107,6 +107,7 @@ def check_motion(ran: Ran, path: np.ndarray = PATH) -> None:
     on_path = ran.state != State.HOME
     off, _ = contour_error(ran.position[on_path], path, whole().segment[row][on_path], np.full(on_path.sum(), 0.05))
     assert off.max() < 1e-6
+    assert (ran.rate[~np.isin(ran.state, (State.RUNS, State.HOME))] == 0.0).all(), "what stands has no rate"
     # and what the laws are told of velocity is that of the positions
     between = 0.5 * (ran.velocity[1:] + ran.velocity[:-1])
     assert np.abs(moved - between)[ran.state[1:] != State.HOME].max(initial=0.0) < 0.05
@@ -119,7 +120,7 @@ def test_without_anybody_s_doing_it_is_the_plan() -> None:
     assert (ran.velocity == program.velocity).all()
     assert (ran.acceleration == program.acceleration).all()
     assert (ran.line == program.line).all()
-    assert (ran.place == np.arange(program.samples)).all()
+    assert (ran.place == np.arange(program.samples)).all() and (ran.rate == 1.0).all()
     assert (ran.ending, ran.reason) == (Ending.DONE, "")
 
 
@@ -230,6 +231,9 @@ def test_a_dwell_lasts_as_long_whatever_the_override() -> None:
     for share in (0.5, 2.0):
         ran = execute(program, [(0.0, "override", share)])
         assert (ran.state == State.DWELL).sum() == 250
+    dwelt = np.flatnonzero(execute(program).state == State.DWELL)
+    ran = execute(program, [(T * dwelt[100], "override", 0.5)])
+    assert ran.rate[dwelt[-1] + 1] == 0.5, "at rest a rate is taken at once"
 
 
 def test_cutting_begins_when_the_spindle_turns_as_fast_as_it_should() -> None:

@@ -46,21 +46,59 @@ def test_samples_are_matched_by_number_not_by_row() -> None:
     assert comparison.axes["X"].samples == 2
     assert comparison.axes["X"].identical
     assert not comparison.identical  # each has samples that the other lacks
+    longer = compare(small([0.0, 1.0]), small([0.0, 1.0, 2.0]))
+    assert not longer.identical
+    assert longer.notes == ("2 samples are common; the first result has 2, the second 3",)
     assert "2 samples are common; the first result has 4, the second 3" in comparison.notes
     time, difference = comparison.difference("X")
     assert time.tolist() == pytest.approx([0.2, 0.3])
     assert difference.tolist() == [0.0, 0.0]
 
 
+def test_a_column_that_one_result_lacks_is_not_compared() -> None:
+    more = {"X_voltage": [1.0, 2.0], "X_speed": [1.0, 2.0]}
+    driven = Result(dict(small([0.0, 1.0]).columns) | more, meta=small([]).meta)
+    for pair in ((driven, small([0.0, 1.0])), (small([0.0, 1.0]), driven)):
+        assert compare(*pair).identical
+
+
+def test_signals_are_compared_in_one_unit_only() -> None:
+    def run(unit: str, *told: float) -> Result:
+        columns = dict(small([0.0, 1.0]).columns) | {"X_speed": list(told)}
+        return Result(columns, {"X_speed": unit}, small([]).meta)
+
+    same, other = compare(run("mm/s", 0.0, 1.0), run("mm/s", 3.0, 5.0)), compare(run("mm/s", 0, 1), run("m/s", 3, 5))
+    speed = same.axes["X"].signals["speed"]
+    assert (speed.unit, speed.max_difference, speed.rms_difference) == ("mm/s", 4.0, pytest.approx(np.sqrt(12.5)))
+    assert not same.identical and other.identical and other.axes["X"].signals == {}
+    note = "X_speed is in 'mm/s' in the first result and in 'm/s' in the second: left out"
+    assert note in other.notes and note not in same.notes
+
+
 def test_one_bit_is_a_difference() -> None:
     a = make_result("simulation")
     columns = {name: values.copy() for name, values in a.columns.items()}
     columns["X_voltage"][1234] = np.nextafter(columns["X_voltage"][1234], np.inf)
+    columns["X_reference"][2000] = np.nextafter(columns["X_reference"][2000], np.inf)
     axis = compare(a, Result(columns, a.units, a.meta)).axes["X"]
     assert not axis.identical
     assert axis.first_difference == pytest.approx(1.234)
-    assert axis.differing_columns == ("X_voltage",)
+    assert axis.differing_columns == ("X_reference", "X_voltage")
     assert axis.max_difference == 0.0
+
+
+def test_contour_errors_are_those_of_the_motion() -> None:
+    def run(states: list[int], *errors: float) -> Result:
+        time = np.arange(3) * 0.1
+        columns = {"time": time, "X_measured": time, "contour_error": list(errors), "program_state": states}
+        return Result(columns, meta={"axes": ["X"], "sample_period": 0.1})
+
+    found = compare(run([0, 0, 1], 3.0, 4.0, 99.0), run([0, 1, 6], 2.0, 99.0, 2.0)).contour
+    assert found == {
+        "largest contour error": (4.0, 2.0),
+        "RMS contour error": (pytest.approx(np.sqrt(12.5)), pytest.approx(2.0)),
+    }
+    assert compare(run([0, 0, 1], 3.0, 4.0, 99.0), run([1, 1, 1], 2.0, 99.0, 2.0)).contour == {}
 
 
 def test_controllers_are_told_apart() -> None:

@@ -62,6 +62,15 @@ def test_the_first_period_is_left_out() -> None:
     assert metric_notes(result) == ["X: the metrics leave out the first period of the reference (0.3 s)."]
 
 
+def test_of_a_part_program_only_its_motion_counts() -> None:
+    """State 0 runs and 6 goes home; held (1) and over (7) it does not move."""
+    result = of([1.0, 9.0, 1.0, 9.0, 1.0], period=0.2, program_state=[0, 1, 6, 7, 0])
+    assert result.metrics["X"]["max_abs_error"] == 1.0
+    assert metric_notes(result) == [
+        "The metrics leave out 2 of 5 samples, in which the part program waited, dwelt or was held."
+    ]
+
+
 def test_a_run_with_nothing_to_compare_says_nothing_of_metrics() -> None:
     """A system test has a periodic voltage and a measured response: no metric, so none that leaves a period out."""
     time = 0.1 * np.arange(6)
@@ -156,8 +165,8 @@ def test_importing_results_is_light() -> None:
 
 
 def test_discarded_periods_do_not_shorten_a_run() -> None:
-    """Samples 1, 2 and 5 were discarded: the run is as long as if they were there, and time decides what is used."""
-    time = np.array([0, 3, 4, 6, 7]) * 0.1
+    """Samples 1, 2 and 5 after 5 s were discarded: the run is as long as with them, and time decides what is used."""
+    time = 5.0 + np.array([0, 3, 4, 6, 7]) * 0.1
     meta = {"axes": ["X"], "sample_period": 0.1, "period": {"X": 0.4}}
     result = Result({"time": time, "X_reference": [9, 9, 1, 1, 1], "X_measured": [0.0] * 5}, meta=meta)
     assert result.length == pytest.approx(0.8)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import booleans, dictionaries, floats, integers
 
-from rds.core.types import Verdict
+from rds.core.clock import LatePolicy, RealTimeClock
+from rds.core.types import Ending, Verdict
+from rds.modes.loop.loop import Loop
+from rds.modes.loop.stopwatch import Stopwatch
 from rds.modes.process.timing import Timing, judge, late_samples, longest_run, own_wait, replay, summary
 
 MS = 1_000_000
@@ -184,6 +189,27 @@ def test_a_stall_seen_by_the_rehearsal_counts() -> None:
     assert verdict(compute=some(50, 2.0), stalls=5) == Verdict.MISSED
 
 
+@pytest.mark.parametrize(
+    "longest, stolen, expected", [(600, 0, Verdict.MISSED), (700, 0, Verdict.VOID), (600, 1, Verdict.VOID)]
+)
+def test_an_overrun_beyond_three_times_the_longest_stall_is_the_codes(
+    longest: float, stolen: int, expected: Verdict
+) -> None:
+    """It takes 3.01 ms: a period of 1 ms, and more than three times 0.6 ms, but not 0.7 ms. A clock tick is 10 ms."""
+    timing, counts = ran(inside={500: 2.85})
+    environment = {"rehearsal": {"lateness_max": longest}, "stolen_ticks": stolen}
+    assert judge(timing, MS, **counts, stalls=1, environment=environment).verdict == expected
+
+
+def test_discarded_periods_count_where_a_module_fell_silent() -> None:
+    """Of 50 periods that were not kept, a module must have been silent in half to be what held them up."""
+    timing, counts = ran(waits={500: 50.0}, discard=True)
+    assert counts["discarded"] == 50
+    for silent, who in ((9, "the computer"), (24, "the computer"), (25, "a module")):
+        judgement = judge(timing, MS, **counts, silent=silent)
+        assert judgement.verdict == Verdict.VOID and judgement.reason.startswith(who)
+
+
 def test_threads_that_the_code_left_running_are_its_own() -> None:
     waits = dict.fromkeys(range(10, N, 100), 5.0)
     timing, counts = ran(waits=waits)
@@ -238,6 +264,10 @@ def test_reasons_say_what_and_how_much() -> None:
     judgement = judge(timing, MS, **counts, missing=20)
     assert judgement.reason.startswith("the computer or the bus was busy")
     assert "20 answers did not come within the period" in judgement.evidence
+    throttled = {"scheduler": "SCHED_FIFO 80", "rt_runtime_us": 950_000, "rt_period_us": 1_000_000}
+    assert "for about the 50 ms of each second" in judge(timing, MS, **counts, environment=throttled).evidence
+    timing, counts = ran(compute=0.95)  # with the I/O it is too much in every sample
+    assert "took 0.960 ms at the 99th percentile" in judge(timing, MS, **counts).reason
     timing, counts = ran(waits={500: 1.0})
     assert "within the limit of 9" in judge(timing, MS, limit=9).reason
     assert "all 1000 samples" in judge(ran()[0], MS).reason
@@ -290,6 +320,69 @@ def test_the_replay_by_hand() -> None:
     assert replay(work, np.array([0, 1, 4, 5, 6, 7]), MS).tolist() == [False, True, False, False, False, False]
 
 
+def test_the_models_live_through_periods_that_the_loop_discards() -> None:
+    """Of 8 samples 1 to 3 and the last two are discarded; what was asked for in between is kept."""
+    followed: list[object] = []
+    rows: list[list[float]] = []
+
+    def law(k: int, positions: Sequence[float], row: list[float], voltages: list[float]) -> None:
+        assert k < 100
+        row.append(10.0 * k)
+        voltages.append(k + positions[0])
+
+    def follow(acting: Sequence[float]) -> Sequence[float]:
+        followed.append(tuple(acting))
+        return [-1.0]
+
+    due = {0: 0, 1: 4, 5: 5, 6: 9}
+    loop = Loop(8, due.__getitem__, lambda: [0.5], [law], lambda v: [2 * v[0]], follow, rows.append, lambda k: None)
+    assert loop.run(1) is None and loop.k == 1
+    assert loop.run() is Ending.DONE and loop.k == 6
+    assert rows == [[0, 0.0, 1.0, -1.0], [4, 40.0, 9.0, -1.0], [5, 50.0, 11.0, -1.0]]
+    assert followed == [(1.0,), (), (), (), (9.0,), (11.0,), (), ()]
+    ended = replace(loop, k=5, finish=lambda k: Ending.STOPPED if k == 5 else None)
+    assert ended.run() is Ending.STOPPED and ended.k == 6
+    ended.k, ended.samples, ended.wait = 100, 200, lambda k: k
+    with pytest.raises(AssertionError):
+        ended.run()
+    assert ended.k == 100, "the sample that failed"
+
+
+@pytest.mark.parametrize("sets_references, stages", [(True, (2, 4)), (False, (0, 6))])
+def test_each_stage_has_its_own_time(sets_references: bool, stages: tuple[int, int]) -> None:
+    """Stages of 1, 2, 4, 8 and 16 µs, begun 32 µs after the sample is due; 3 µs are taken from the code."""
+    clock, at, spans, counted = RealTimeClock(MS, LatePolicy(stop_after=1)), [0], [], []
+
+    def taking(micros: int, *gives: float, late: int = 0) -> Callable[..., Any]:
+        def stage(k: object = None, *_: object) -> Any:
+            at[0] += 1000 * (micros + (late if k == 2 else 0))
+            return list(gives)
+
+        return stage
+
+    def wait(k: int) -> int:
+        at[0] = (k + 1) * MS + 32_000  # sample 0 is due one period after the start
+        return k
+
+    clock.now, clock.wait = (lambda: at[0]), wait  # type: ignore[method-assign]
+    clock.start()
+    rows: list[list[float]] = []
+    stopwatch = Stopwatch(clock, rows.append, lambda: False)
+    stopwatch.thread.taken = lambda span: spans.append(span) or 3000  # type: ignore[method-assign, func-returns-value]
+    stopwatch.instructions.end = counted.append  # type: ignore[method-assign]
+    laws = [taking(2), taking(4, late=1000)]
+    parts = (taking(1, 0.0), laws, taking(8, 0.5), taking(16, 0.7), rows.append, lambda k: None)
+    loop = Loop(9, wait, *parts, sets_references=sets_references)
+    ending = stopwatch.time(loop).run()
+    stopwatch.close()
+    assert rows[:2] == [[k, 32_000, 9000, stages[0] * 1000, stages[1] * 1000, 16_000, 3000, 0.5, 0.7] for k in (0, 1)]
+    assert spans[0] == 30_000 and counted[0] == 30_000 - 3000 - 8000
+    assert (ending, len(rows)) == (Ending.OVERLOADED, 3)
+    stopped = Stopwatch(clock, rows.append, lambda: True)
+    assert (stopped.time(loop).run(), len(rows)) == (Ending.STOPPED, 4)
+    stopped.close()
+
+
 def test_the_summary_counts_and_sorts() -> None:
     timing, _ = ran(compute=some(10, 3.0))
     report = summary(timing, MS)
@@ -298,6 +391,9 @@ def test_the_summary_counts_and_sorts() -> None:
     assert report["compute"]["max"] == pytest.approx(3000.0)
     assert sum(report["compute"]["histogram"]) == N
     assert len(report["compute"]["histogram"]) == len(report["histogram_edges_us"])
+    assert report["lateness"]["p50"] == 0.0 and "interpolate" not in report, "there was no path"
+    along = replace(timing, interpolate=np.full(N, 20_000.0))
+    assert summary(along, MS)["interpolate"]["p99"] == pytest.approx(20.0)
     assert report["late"] == int(late_samples(timing, MS).sum())
     assert report["longest_late_run"] == 3
     assert longest_run(np.array([], dtype=bool)) == 0

@@ -78,6 +78,44 @@ def test_a_younger_one_is_obeyed(late: float) -> None:
     assert say(made, at + (1.0 - late) * PERIOD, at + PERIOD) == Status.ENABLED
 
 
+@pytest.mark.parametrize(
+    "sent, came, verdict",
+    [
+        (12, 12.0, Verdict.FRESH),
+        (12, 17.0, Verdict.FRESH),
+        (12, 17.01, Verdict.OLD),
+        (12, 31.0, Verdict.OLD),
+        (12, 31.01, Verdict.FIRST),  # nothing was heard for ten periods
+        (36, 12.0, Verdict.FRESH),  # the first ones may have been twelve periods late
+        (37, 12.0, Verdict.STRANGE),
+        (12, 12.0 + frames.NUMBERS, Verdict.FIRST),
+    ],
+)
+def test_the_age_of_a_command_by_its_number(sent: int, came: float, verdict: Verdict) -> None:
+    """A sample period of 1 s, instants in half periods as the numbers; those before were on time."""
+    freshness = Freshness(1.0)
+    assert freshness.judge(10, 5.0) == Verdict.FIRST and not freshness.followed(5.0)
+    assert freshness.judge(11, 5.5) == Verdict.FRESH
+    assert freshness.followed(15.5) and not freshness.followed(15.505)
+    assert freshness.judge(sent, came / 2) == verdict
+    assert freshness.followed(came / 2) == (verdict in (Verdict.FRESH, Verdict.OLD, Verdict.STRANGE))
+
+
+def test_a_first_command_that_no_second_agrees_with_is_forgotten() -> None:
+    freshness = Freshness(2.0)
+    for number_, at in ((100, 10.0), (11, 11.0)):
+        assert freshness.judge(number_, at) == Verdict.FIRST
+    assert freshness.judge(12, 12.0) == Verdict.FRESH
+
+
+def test_the_quickest_command_is_what_the_others_are_compared_with() -> None:
+    """The first two were three half periods late; then one on time makes four more too old."""
+    freshness = Freshness(2.0)
+    assert freshness.judge(10, 13.0) == Verdict.FIRST and freshness.judge(11, 14.0) == Verdict.FRESH
+    assert freshness.judge(12, 19.9) == Verdict.FRESH and freshness.judge(20, 20.0) == Verdict.FRESH
+    assert freshness.judge(15, 20.5) == Verdict.OLD and freshness.judge(16, 20.9) == Verdict.FRESH
+
+
 def test_a_command_acts_no_longer_than_two_and_a_half_periods() -> None:
     made = module()
     for k in range(2):

@@ -60,6 +60,8 @@ def test_square_and_triangle_sample_by_sample():
     np.testing.assert_array_equal(square(2, 1).value(t), [2, 2, 2, 2, -2, -2, -2, -2])
     np.testing.assert_array_equal(square(2, 1, offset=1, phase=90).value(t), [3, 3, -1, -1, -1, -1, 3, 3])
     np.testing.assert_allclose(triangle(2, 1).value(t), [0, 1, 2, 1, 0, -1, -2, -1])
+    np.testing.assert_allclose(triangle(2, 1, phase=90).value(t), [2, 1, 0, -1, -2, -1, 0, 1])
+    np.testing.assert_allclose(sinusoid(2, 1, phase=90).value(t), 2 * np.cos(2 * np.pi * t), atol=1e-15)
     _, velocity, acceleration = triangle(2, 1).reference(t)
     np.testing.assert_array_equal(velocity, [8, 8, -8, -8, -8, -8, 8, 8])
     np.testing.assert_array_equal(acceleration, 0)

@@ -91,6 +91,15 @@ def test_rows_are_reached_at_their_sample_in_spite_of_rounding(tmp_path):
     np.testing.assert_array_equal(held.value(np.arange(50) * 0.1), np.arange(50))
 
 
+def test_rows_that_begin_later_repeat_from_there(tmp_path):
+    """Rows at 0.3 and 0.7 s, every second: from the last row to the next first one it stays."""
+    rows = write(tmp_path, "0.3,1\n0.7,5\n")
+    signal = user(file=rows, interpolation="linear", period=1.0)
+    np.testing.assert_allclose(
+        signal.value(np.array([0.2, 0.3, 0.5, 0.7, 0.9, 1.2, 1.3, 1.6])), [5, 1, 3, 5, 5, 5, 1, 4]
+    )
+
+
 def test_rows_repeat_with_a_period(tmp_path):
     signal = user(file=write(tmp_path, "0,0\n1,2\n2,0\n"), period=2.0)
     np.testing.assert_allclose(signal.value([0.5, 2.5, 3.0, 7.0]), [1, 1, 2, 2])
@@ -144,6 +153,7 @@ def test_rows_to_either_side_of_the_peak_of_an_acceleration_belong_together(tmp_
         ("time,value (desired)\n0,1\n1,2\n", 1, "give the value in mm or V, and a heading with that unit or none"),
         ("time_s,value (m)\n0,1\n1,2\n", 1, "the column 'value (m)' is in m; give the value in mm or V"),
         ("t,p,v [mm/s],a [m/s²]\n0,0,0,0\n1,0,0,0\n", 1, "give the acceleration in mm/s²"),
+        ("time,position_m\n0,1\n1,2\n", 1, "the column 'position_m' is in m; give the value in mm or V"),
         ("t/ms,u/V\n0,1\n500,2\n", 1, "the column 't/ms' is in ms; give the time in s"),
         ("value,time\n1,0\n", 1, "the first column is 'value'"),
         ("0,0,1,0\n1,1,1,0\n2,5,1,0\n", 3, "must belong together"),

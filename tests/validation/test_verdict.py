@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,15 +19,15 @@ from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.structures.structures import structure
 from rds.identification.validate.alternatives import with_alternatives
-from rds.identification.validate.assessment import assess
+from rds.identification.validate.assessment import Assessment, Range, assess
 from rds.identification.validate.candidate import as_candidate
-from rds.identification.validate.conclusion import overall
+from rds.identification.validate.conclusion import conclude, overall, sentence_of
 from rds.identification.validate.discrepancy import Off
 from rds.identification.validate.judge import judge
 from rds.identification.validate.same_data import overlap
 from rds.identification.validate.validate import Validation, validate
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
-from rds.identification.validate.within import frequency_told
+from rds.identification.validate.within import Measure, frequency_told
 from tests.validation.validation_logs import STEP, T, X, candidate, log, moved, square
 
 FRESH = square(8.0, 3.0, 0.7)
@@ -397,6 +398,171 @@ def test_a_reason_that_logs_share_is_given_once_with_their_names() -> None:
     verdicts = {name: Verdict(Word.PARTLY, name, (shared, own) if name == "a" else (shared,)) for name in "abcdef"}
     given = [reason.what for reason in overall(verdicts).reasons]
     assert given == ["a, b, c, d and 2 more: the fit warned of it", "a: the voltage is 2 % off"]
+
+
+@pytest.mark.parametrize(
+    "words, word, purpose",
+    [
+        ("valid, valid", "valid", ""),
+        ("valid, valid for", "valid for", "purpose of b"),
+        ("valid for, valid for", "valid for", "purpose of a; purpose of b"),
+        ("valid, not valid, valid for", "not valid", ""),
+        ("cannot tell, valid", "valid", ""),
+        ("cannot tell, not valid", "not valid", ""),
+        ("cannot tell, cannot tell", "cannot tell", ""),
+    ],
+)
+def test_several_logs_are_as_valid_as_the_least_that_can_tell(words: str, word: str, purpose: str) -> None:
+    given = [Word(each) for each in words.split(", ")]
+    verdicts = {
+        name: Verdict(each, f"{name} said.", (), f"purpose of {name}" if each is Word.PARTLY else "")
+        for name, each in zip("abc", given, strict=False)
+    }
+    found = overall(verdicts)
+    assert (found.word, found.purpose) == (word, purpose)
+    others = [f"{name}: {each}" for name, each in zip("abc", given, strict=False) if each != word]
+    assert f"Beside that: {', '.join(others)}." in found.sentence if others else "Beside" not in found.sentence
+    assert overall({"a": verdicts["a"]}) is verdicts["a"]
+    assert overall(verdicts, (Reason(Side.NOTE, "contradiction", "so"),)).sentence.endswith("contradict each other.")
+
+
+def assessed(position: float = 95.0, velocity: float | None = None, closed: bool = False, **more: object) -> Assessment:
+    """What `conclude` looks at, of a log without findings: a free run that fits so many per cent."""
+    whole = {"velocity": Range((-10.0, 10.0), (-10.0, 10.0), "mm/s"), "command": Range((-8.0, 8.0), (-8.0, 8.0), "V")}
+    given = {
+        "free_run": SimpleNamespace(fit_percent=position),
+        "velocity": None if velocity is None else SimpleNamespace(fit_percent=velocity, rmse=1.0),
+        "log": SimpleNamespace(closed_loop=closed, sample_period=T),
+        "as_axis": None,
+        "as_motion": None,
+        "noise": 0.0,
+        "block": 1,
+        "ahead": {},
+        "naive": {},
+        "measured": np.zeros(9),
+        "voltage": None,
+        "ranges": whole,
+    }
+    return SimpleNamespace(**given | more)  # type: ignore[return-value]
+
+
+def foretold(rmse: float) -> dict[str, object]:
+    """Predictions two samples ahead, in which the axis goes on by 2; without a model they are off by as much."""
+    ahead, naive = {2: SimpleNamespace(rmse=rmse)}, {2: SimpleNamespace(rmse=2.0)}
+    return {"ahead": ahead, "naive": naive, "measured": np.arange(9.0)}
+
+
+SLOWER = {"velocity": Range((-4.0, 4.0), (-10.0, 10.0), "mm/s")}
+FASTER = {"velocity": Range((-12.0, 12.0), (-10.0, 10.0), "mm/s")}
+FORWARD = {"velocity": Range((-0.4, 10.0), (-10.0, 10.0), "mm/s")}
+BACKWARD = {"velocity": Range((-10.0, 0.4), (-10.0, 10.0), "mm/s")}
+NEEDED = SimpleNamespace(relative_percent=5.0)
+FOREIGN = "data-units"  # a finding about the log
+
+
+@pytest.mark.parametrize(
+    "a, reasons, word, purpose",
+    [
+        (assessed(), "", "valid", ""),
+        (assessed(), "against residual", "valid for", "simulating the speed"),
+        (assessed(95.0, 95.0), "against residual", "valid for", "simulating position and velocity"),
+        (assessed(95.0, 50.0), "against free-run-velocity", "valid for", "simulating the position"),
+        (assessed(50.0, 95.0), "against free-run", "valid for", "simulating the velocity"),
+        (assessed(50.0, 50.0), "", "not valid", ""),
+        (assessed(closed=True), "", "valid for", "simulating the speed in a closed loop such as this"),
+        (assessed(ranges=SLOWER), "", "valid for", "simulating the speed up to 4 mm/s"),
+        (assessed(ranges=FASTER), "", "valid for", "simulating the speed up to the 12 mm/s tried here"),
+        (assessed(ranges=FORWARD), "", "valid", ""),  # a spindle may turn one way
+        (assessed(95.0, 95.0, ranges=FORWARD), "", "valid for", "simulating position and velocity in one direction"),
+        (assessed(95.0, 95.0, ranges=BACKWARD), "", "valid for", "simulating position and velocity in one direction"),
+        (assessed(50.0, **foretold(0.19)), "", "valid for", "predicting 2 samples ahead"),
+        (assessed(50.0, **foretold(0.19)), "against voltage", "not valid", ""),
+        (assessed(50.0, **foretold(0.21)), "", "not valid", ""),
+        *((assessed(), f"against {kind}", "not valid", "") for kind in ("unstable", "sign", "unit", "gain", "loop")),
+        (assessed(), f"cannot tell {FOREIGN}", "cannot tell", ""),
+        (assessed(), f"cannot tell {FOREIGN}, against gain", "not valid", ""),
+        (assessed(), "cannot tell same-data, against gain", "not valid", ""),
+        (assessed(), "cannot tell little, against gain", "cannot tell", ""),
+        (assessed(50.0), "cannot tell gain-unidentifiable, against voltage, against ahead", "not valid", ""),
+        (assessed(50.0), "cannot tell gain-unidentifiable, against voltage", "cannot tell", ""),
+        (assessed(95.0), "cannot tell gain-unidentifiable, against voltage, against ahead", "cannot tell", ""),
+        (assessed(50.0), "cannot tell little, against voltage, against ahead", "cannot tell", ""),
+        (
+            assessed(50.0, closed=True),
+            "for forces",
+            "valid for",
+            "foretelling the force of a motion in a closed loop such as this",
+        ),
+        (assessed(50.0), "for forces", "not valid", ""),
+        (assessed(50.0, closed=True), "", "not valid", ""),
+        (assessed(50.0, closed=True, voltage=NEEDED), "", "cannot tell", ""),
+        (assessed(50.0, closed=True, voltage=NEEDED), "against voltage", "not valid", ""),
+        (assessed(50.0, voltage=NEEDED), "", "not valid", ""),
+    ],
+)
+def test_from_errors_and_reasons_to_the_word(a: Assessment, reasons: str, word: str, purpose: str) -> None:
+    said = [each.rsplit(" ", 1) for each in reasons.split(", ") if each]
+    given = [Reason(Side(side), kind, "so it is") for side, kind in said]
+    assert conclude(a, given, Bands()) == (word, purpose)
+
+
+OWN = "Do not take its parameters for the axis's own: this log contradicts them."
+LACKS = "Its parameters may not be the axis's own: they may make up for something that it lacks."
+HELD = "That its parameters are the axis's own is not shown: see the predictions."
+
+
+@pytest.mark.parametrize(
+    "word, reasons, sentence",
+    [
+        ("valid", "", "M is valid for a.csv (up to 10 mm/s and 8 V)."),
+        ("cannot tell", "", "Cannot tell whether M is valid, from a.csv (up to 10 mm/s and 8 V)."),
+        ("not valid", "against ahead, for gain", "M is not valid for a.csv (up to 10 mm/s and 8 V)."),
+        ("not valid", "against gain, against delay", "M is not valid for a.csv (up to 10 mm/s and 8 V): gain; delay."),
+        ("valid for", "", "M is valid for braking only, by a.csv (up to 10 mm/s and 8 V)."),
+        *(
+            ("valid for", reasons, f"M is valid for braking only, by a.csv (up to 10 mm/s and 8 V). {more}")
+            for reasons, more in (
+                ("against parameters, against structure", OWN),
+                ("against structure, against structure-held", LACKS),
+                ("against structure-held", HELD),
+            )
+        ),
+        ("valid for", "for parameters", "M is valid for braking only, by a.csv (up to 10 mm/s and 8 V)."),
+    ],
+)
+def test_the_sentence_of_a_verdict(word: str, reasons: str, sentence: str) -> None:
+    said = [each.rsplit(" ", 1) for each in reasons.split(", ") if each]
+    given = [Reason(Side(side), kind, f"{kind}: so it is") for side, kind in said]
+    a = assessed(log=SimpleNamespace(name="a.csv"), frequency=0.0)
+    model = SimpleNamespace(name="M", parameters={})
+    assert sentence_of(model, a, Word(word), "braking", given) == sentence  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "kind, value, error, wrong, told, borderline",
+    [
+        ("gain", 3.0, 0.0, False, True, True),
+        ("gain", 3.1, 1.0, True, True, True),  # 3.1 standard errors
+        ("gain", 3.1, 1.3, False, True, True),  # 2.4; up to 5.7 %, of 6
+        ("gain", -3.1, 1.5, False, False, True),
+        ("gain", 2.2, 0.0, False, True, False),
+        ("gain", -4.1, 0.0, True, True, False),
+        ("gain", 0.0, float("inf"), False, False, False),
+        ("phase", 2.0, 1.0, False, True, False),
+        ("phase", 2.0, 1.2, False, False, False),  # up to 4.4, of 4.2
+        ("delay", 4.0, 1.0, False, False, False),  # four standard errors are not enough of a delay
+        ("delay", 5.1, 1.0, True, True, False),
+        ("friction", 0.0, 1.5, False, True, False),
+        ("friction", 0.0, 1.6, False, False, False),
+    ],
+)
+def test_what_is_clearly_wrong_and_what_the_log_leaves_open(
+    kind: str, value: float, error: float, wrong: bool, told: bool, borderline: bool
+) -> None:
+    """A band of 3: beyond it and 2.6 standard errors (of a delay 5) it is wrong."""
+    measure = Measure(kind, Off(value, error, "%"), 3.0)
+    assert (measure.wrong, measure.told, measure.borderline) == (wrong, told, borderline)
+    assert not replace(measure, by_chance=True).wrong
 
 
 def test_what_the_loop_that_was_logged_says_stands_whatever_the_choice() -> None:

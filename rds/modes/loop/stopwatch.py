@@ -28,7 +28,7 @@ class Stopwatch:
         self._clock, self._append, self._stop = clock, append, stop
         self.thread = ThreadTime()
         self.instructions = InstructionCounter(clock.period)
-        self._k = self._started = self._read = self._referred = self._computed = self._written = self._ended = 0
+        self._started = self._read = self._referred = self._computed = self._written = self._ended = 0
         self._is_copy = False  # of the process, made by a fork in the student's code: it must neither drive nor record
         if hasattr(os, "register_at_fork"):
             os.register_at_fork(after_in_child=self._copied)
