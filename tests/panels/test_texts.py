@@ -168,8 +168,8 @@ def test_values_and_parts_are_put_where_they_belong(exchange: Callable[..., Any]
             "um die Form eine Zeile oder Spalte leer lassen",
         ),
         (
-            "1 lines, 0 arcs, 50.04 mm, 10.0 s at the feed; X 0 to 40, Y 0 to 30, Z -2 to 0 mm",
-            "1 Geraden, 0 Bögen, 50.04 mm, 10.0 s im Vorschub; X 0 bis 40, Y 0 bis 30, Z -2 bis 0 mm",
+            "lines: 1, arcs: 0, 50.04 mm, 10.0 s at the feed; X 0 to 40, Y 0 to 30, Z -2 to 0 mm",
+            "Geraden: 1, Bögen: 0, 50.04 mm, 10.0 s im Vorschub; X 0 bis 40, Y 0 bis 30, Z -2 bis 0 mm",
         ),
     ],
 )
