@@ -351,7 +351,7 @@ def test_a_function_of_a_notebook_is_told_how_its_params_go_with_it() -> None:
 
 
 def test_a_param_that_is_spelt_in_another_way_is_shown_as_it_is_there() -> None:
-    """"Hand params over" was said to a student who had, with Kd in place of kd."""
+    """ "Hand params over" was said to a student who had, with Kd in place of kd."""
     error, params = KeyError("kd"), {"Kp": 30.0, "Kd": 0.3}
     assert missing_param(error, params, None) == "params has 'Kd': write the name alike in both places"
     assert "hand params over" in missing_param(KeyError("mass"), params, None)

@@ -69,7 +69,11 @@ def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]
             Block("machine", f"Machine, {_name(axes)}", _of_each(axes, _travel), column + 1),
             encoder,
         ]
-        links += [Link(acting, "converter", "u [V]"), Link("converter", "machine", "V"), Link("machine", "encoder", moved)]
+        links += [
+            Link(acting, "converter", "u [V]"),
+            Link("converter", "machine", "V"),
+            Link("machine", "encoder", moved),
+        ]
         if mode.modelled:
             blocks.append(Block("model", model.title, model.lines, column + 1, row=1))
             links.append(Link("converter", "model", "same voltage [V]"))
