@@ -56,7 +56,7 @@ class DataView:
         )
         self._known.observe(self._picked, "value")
         self._upload = FileImport("Import a file", _IMPORT, self._imported, self.notice)
-        self._map = widgets.Textarea(rows=10, tooltip="", layout=widgets.Layout(width="100%"))
+        self._map = widgets.Textarea(rows=10, tooltip="", layout=widgets.Layout(width="calc(100% - 4px)"))
         self._map_says = Html("")
         self._map_box = widgets.VBox(
             [
