@@ -18,6 +18,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -269,10 +270,15 @@ def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source:
 
 
 def missing_param(error: BaseException, params: Mapping[str, Any], source: Source | None) -> str:
-    """How to define the parameter for want of which control() failed; empty where it was not that."""
+    """How to define the parameter for want of which control() failed, or what it is called; empty where it was not
+    that.
+    """
     key = error.args[0] if isinstance(error, KeyError) and error.args else None
     if not isinstance(key, str) or key in params or _is_of_another_dict(error, key, params):
         return ""
+    spelt = {str(name).lower(): str(name) for name in params}
+    if alike := get_close_matches(key.lower(), spelt, n=1):
+        return f"params has {spelt[alike[0]]!r}: write the name alike in both places"
     return how_to_define("params", f"{{{key!r}: 1.0}}", source)
 
 

@@ -106,7 +106,15 @@ def verdict_line(result: Result, label: str = "") -> str:
 
 def notes_list(notes: Iterable[str]) -> str:
     """Notes as a small paragraph each."""
-    return "".join(f'<p class="note">{escape(note)}</p>' for note in notes)
+    return "".join(f'<p class="note">{_parts(escape(note))}</p>' for note in notes)
+
+
+def _parts(note: str) -> str:
+    """A note about the bus in parts, so that the page finds each of them in its language's file."""
+    start, bus, rest = note.partition("on the bus: ")
+    if start or not bus:
+        return note
+    return f"<span>{bus}</span>{'; '.join(f'<span>{part}</span>' for part in rest.split('; '))}"
 
 
 def result_fragment(result: Result) -> str:

@@ -13,7 +13,7 @@ import pytest
 
 from rds.checks import check_controller
 from rds.core.errors import ContractError, InputError, Notice
-from rds.core.load import from_function, from_namespace, load_student, student_error
+from rds.core.load import from_function, from_namespace, load_student, missing_param, student_error
 from rds.core.types import Reference
 
 CONTROL = "def control(t, r, y, state, params):\n    return 0.0, state\n"
@@ -361,6 +361,13 @@ def test_a_function_of_a_notebook_is_told_how_its_params_go_with_it() -> None:
     """Those of the cell are not looked at, so "define them" sent round in a circle who had."""
     with pytest.raises(ContractError, match=r'hand params over .*`\{"control": control, "params": \{.Kp.: 1.0\}\}`'):
         from_function(lambda t, r, y, state, params: (params["Kp"], state), role="control").controller()
+
+
+def test_a_param_that_is_spelt_in_another_way_is_shown_as_it_is_there() -> None:
+    """ "Hand params over" was said to a student who had, with Kd in place of kd."""
+    error, params = KeyError("kd"), {"Kp": 30.0, "Kd": 0.3}
+    assert missing_param(error, params, None) == "params has 'Kd': write the name alike in both places"
+    assert "hand params over" in missing_param(KeyError("mass"), params, None)
 
 
 def test_a_function_of_a_notebook_that_keeps_a_global_is_told() -> None:

@@ -301,7 +301,8 @@ def test_a_draft_with_columns_that_nothing_tells_asks_for_them(tmp_path: Path) -
     path.write_text("t_s;p1;p2\n" + "".join(f"{k / 1000};{k % 7};{k}\n" for k in range(50)))
     code, _, err = rds("data", "describe", path, "--write-map")
     assert code == 2 and "log.csv.map.toml, a draft" in err
-    assert "column = '?' is the draft's mark for what the file does not tell: name one of its columns" in err
+    mark = "column = '?' is the draft's mark for what the file does not tell: name one of its columns"
+    assert f"{mark}; there is one in lines 10, 11, 14 and 15" in err
     draft = tmp_path / "log.csv.map.toml"
     for mark, said in (("column", "p1"), ("unit", "V"), ("column", "p2"), ("unit", "mm")):
         draft.write_text(draft.read_text().replace(f'{mark} = "?"', f'{mark} = "{said}"', 1))

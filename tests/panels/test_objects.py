@@ -27,7 +27,7 @@ def test_an_arc_is_filled_in_refused_at_its_field_and_made_into_a_program(
     page.wait_for_function(FITS)
     page.get_by_label("Sweep").fill("-90")
     page.keyboard.press("Tab")
-    page.wait_for_selector(f'{GOOD}:has-text("0 lines, 1 arcs")')
+    page.wait_for_selector(f'{GOOD}:has-text("lines: 0, arcs: 1")')
     page.wait_for_selector(".rds-main .rds-figure canvas:visible, .rds-main .rds-figure img:visible")
     page.wait_for_function(FITS)
     page.set_viewport_size({"width": 1280, "height": 900})

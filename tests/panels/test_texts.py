@@ -16,6 +16,7 @@ from rds.checks import check_controller, clauses
 from rds.controllers import controller_names
 from rds.machines import load_machine, machine_names
 from rds.machines.library import library
+from rds.modes.experiment.outcome import bus_note
 from rds.panels.code.advice import told
 from rds.panels.code.completions import words as completions
 from rds.panels.equipment.build import Mark, _words
@@ -31,6 +32,7 @@ from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Field
 from rds.panels.texts import exchanger, languages, texts
 from rds.references import signal_kinds
+from rds.results.html import notes_list
 
 SCRIPT = Path(language.__file__).parent / "static" / "texts.js"
 APART = ("style", "code", "pre", "svg", "math")
@@ -168,13 +170,25 @@ def test_values_and_parts_are_put_where_they_belong(exchange: Callable[..., Any]
             "um die Form eine Zeile oder Spalte leer lassen",
         ),
         (
-            "1 lines, 0 arcs, 50.04 mm, 10.0 s at the feed; X 0 to 40, Y 0 to 30, Z -2 to 0 mm",
-            "1 Geraden, 0 Bögen, 50.04 mm, 10.0 s im Vorschub; X 0 bis 40, Y 0 bis 30, Z -2 bis 0 mm",
+            "lines: 1, arcs: 0, 50.04 mm, 10.0 s at the feed; X 0 to 40, Y 0 to 30, Z -2 to 0 mm",
+            "Geraden: 1, Bögen: 0, 50.04 mm, 10.0 s im Vorschub; X 0 bis 40, Y 0 bis 30, Z -2 bis 0 mm",
         ),
     ],
 )
 def test_a_verdict_is_in_the_language_with_its_numbers(reason: str, put: str) -> None:
     assert exchanger("de")(reason) == put
+
+
+def test_each_part_of_a_note_about_the_bus_is_in_the_language() -> None:
+    """The whole note has as many wordings as things can happen together; the page finds the text of each element."""
+    parts = Words()
+    drivers = {"missing": 830, "late": 800, "damaged": 1, "lost_ticks": 1, "cut": 3, "emergencies": 2}
+    parts.feed(notes_list([bus_note(drivers, {"error_frames": 3, "struck": 1}) or ""]))
+    said = [part.strip() for part in parts.found if part.strip(" ;")]
+    assert len(said) == 8 and said[0] == "on the bus:"
+    put = [exchanger("de")(part) or part for part in said]
+    assert not set(put) & set(said)
+    assert put[1].startswith("830 Antworten von Modulen kamen nicht innerhalb der Periode, 800 davon später (an ihrer")
 
 
 def test_the_page_is_in_the_language_that_is_chosen_and_back_again(

@@ -65,6 +65,18 @@ def test_what_a_run_has_made_of_a_part_program_is_no_log(state: DataState) -> No
     assert state.files() == ["a.csv", "b.csv", "log.dat"]
 
 
+def test_a_map_that_was_saved_can_be_corrected(state: DataState) -> None:
+    """It went out of the page when a column that it names was not there, and only an editor brought it back."""
+    assert state.map_text() == ""
+    text = '[time]\ncolumn = "time"\nunit = "s"\n[axis.X]\ncommand = "command"\nposition = "ch9"\n'
+    state.keep_map(text)
+    described = state.describe()
+    assert described.wait(PATIENCE) and state.description is not None and not state.description.usable
+    assert state.map_text() == text
+    state.choices.set("map", "another.toml")
+    assert state.map_text() == ""
+
+
 def test_what_is_missing_is_said_at_once(state: DataState) -> None:
     with pytest.raises(InputError, match="fit first"):
         state.write_model()

@@ -200,7 +200,7 @@ def test_what_a_run_found_in_a_file_is_said_until_it_is_mended(tmp_path: Path, m
     code = view.edit()
     bad = Checked("controller", code.code.file.path, code.code.file.text, (Mark(1, "x is wrong"),))
     monkeypatch.setattr(view.equipment.builds, "latest", lambda: [bad])
-    view.run = SimpleNamespace(stopped_early=False, error=ContractError("line 1: x is wrong"), result=None)
+    view.run = SimpleNamespace(stopped_early=False, share=None, error=ContractError("line 1: x is wrong"), result=None)
     view._ended()
     assert "line 1: x is wrong" in view.notice.value
     code._found(bad)

@@ -98,7 +98,8 @@ def test_a_position_that_drifts_leaves_a_model_for_velocities_only() -> None:
     ("factor", "kind", "word"),
     [
         (-1.0, "sign", "reversed"),
-        (1000.0, "unit", "1000 times smaller"),
+        (1000.0, "unit", "the model computes in m"),
+        (800.0, "unit", "1000 times smaller"),  # of a model in m without friction: the axis loses a part of its speed
         (1e-3, "unit", "1000 times larger"),
         (25.4, "unit", "inches"),
     ],
@@ -326,7 +327,8 @@ def test_an_unstable_free_run_has_its_instant(closed: bool, word: Word) -> None:
     found = validate(model, log(FRESH, closed_loop=closed))
     a = found.assessments["log"]
     assert found.verdict.word is word
-    assert a.unstable_at is not None and 5.0 < a.unstable_at < 8.0  # 1.1^k passes 1e308 near k = 7400
+    assert not kinds(found, "against") - {"unstable"}  # no fit of -1e85 %, nor that "it moves the other way"
+    assert a.unstable_at is not None and 0.2 < a.unstable_at < 1.0  # 1.1^k passes 1e9 near k = 220
     assert a.free_run is None and found.to_json()["logs"]["log"]["free_run"] is None
 
 

@@ -40,7 +40,7 @@ _WORDS: Mapping[str, frozenset[str]] = {
     "command": frozenset(("command", "cmd", "u", "input", "control", "vir")).union(_DRIVING, _VOLTAGES),
     "position": _words(
         "measured position pos encoder enc y x q qm ist output angle counts feedback actual act istposition "
-        "lageistwert lage posicao posicion posizione salida"
+        "lageistwert lage weg istweg posicao posicion posizione salida"
     ),
 }
 # never what was measured

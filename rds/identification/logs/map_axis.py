@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
@@ -14,6 +15,7 @@ from rds.identification.logs.units import check_unit
 from rds.machines.machine import Machine
 
 UNKNOWN = "?"  # what a draft has for the column of a quantity that nothing in the file tells
+_LEFT_OPEN = re.compile(r"=\s*[\"']\?[\"']")
 WRAPPING = ("position", "reference")  # what a counter that begins again may count
 # what each quantity may be measured in
 DIMENSIONS: Mapping[str, tuple[str, ...]] = {
@@ -129,7 +131,7 @@ def _column(axis: TomlTable, quantity: str) -> ColumnMap:
     if column is None:
         raise InputError(f'{quantity} needs column = "..." ', axis.place(quantity))
     if column == UNKNOWN:
-        raise words.fault("column", "is the draft's mark for what the file does not tell: name one of its columns")
+        raise _left_open(words, "column", "name one of its columns")
     sign = words.any("sign", 1)
     if sign not in (1, -1) or isinstance(sign, bool):
         raise words.fault("sign", "must be 1 or -1")
@@ -190,13 +192,18 @@ def _range(words: TomlTable) -> tuple[float, float] | None:
     return low, high
 
 
+def _left_open(words: TomlTable, key: str, remedy: str) -> InputError:
+    """About the draft's mark, and in which lines there is one: all can be given at once."""
+    lines = [str(k) for k, line in enumerate(words.source.splitlines(), 1) if _LEFT_OPEN.search(line)]
+    among = f"; there is one in lines {', '.join(lines[:-1])} and {lines[-1]}" if len(lines) > 1 else ""
+    return words.fault(key, f"is the draft's mark for what the file does not tell: {remedy}{among}")
+
+
 def unit_of(words: TomlTable, quantity: str) -> str | None:
     """The `unit` of a table; InputError for one that the quantity cannot have, or that the draft left open."""
     unit: str | None = words.read("unit")
     if unit == UNKNOWN:
-        raise words.fault(
-            "unit", f"is the draft's mark for what the file does not tell: give the unit of the {quantity}"
-        )
+        raise _left_open(words, "unit", f"give the unit of the {quantity}")
     if unit is not None:
         try:
             check_unit(unit, DIMENSIONS[quantity], quantity)

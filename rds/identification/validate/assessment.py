@@ -26,6 +26,7 @@ from rds.identification.validate.discrepancy_of_motion import as_motion
 from rds.identification.validate.same_data import Overlap, overlap
 
 _MOVES = 1e-3  # of the measured motion
+_RUNS_AWAY = 1e9  # of the measured motion: no error of a gain or a unit is so large, only a response that grows
 _SLOPE = 1e-3  # of a standard error, for sensitivities
 _FEWEST = 16  # blocks that are worth joining
 _LATEST = 0.75  # of the log: where play is taken up later, no more of it is left out
@@ -136,7 +137,9 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None, b
     if response.shape != y.shape:
         raise InputError(f"the model answers with shape {response.shape} to {len(y)} samples", candidate.name)
     modelled = response[first:]
-    wrong = np.flatnonzero(~np.isfinite(response))
+    far = _RUNS_AWAY * max(float(np.ptp(y)), 1.0)
+    with np.errstate(invalid="ignore"):
+        wrong = np.flatnonzero(~(np.abs(response - y[0]) < far))
     unstable_at = float(t[wrong[0]]) if len(wrong) else None
     frequency = _tried(log, response, candidate.is_rate)
     block = block_length(frequency, log.sample_period, len(modelled))

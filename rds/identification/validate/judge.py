@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from math import inf, sqrt
+from math import inf, log10, sqrt
 
 from rds.identification.fit.estimate import said_of_guesses
 from rds.identification.fit.kstep import over_noise
@@ -26,8 +26,10 @@ from rds.identification.validate.within import (
 
 _FACTORS = {  # of measured over modelled, and what makes it
     -1.0: "the sign of the position or of the command is reversed",
-    1000.0: "the position is in a unit 1000 times smaller than stated (µm for mm, mm for m), or the command in mV",
-    0.001: "the position is in a unit 1000 times larger than stated (m for mm, mm for µm)",
+    1000.0: "the position is in a unit 1000 times smaller than stated (µm for mm, mm for m), the command is in mV, or "
+    "the model computes in m where its unit is mm",
+    0.001: "the position is in a unit 1000 times larger than stated (m for mm, mm for µm), or the model computes in µm "
+    "where its unit is mm",
     25.4: "the position is in mm where inches are stated",
     1.0 / 25.4: "the position is in inches where mm are stated",
     60.0: "the speed is per minute where it is stated per second",
@@ -36,6 +38,7 @@ _FACTORS = {  # of measured over modelled, and what makes it
 NEAR_FIT = 0.25  # of what the band leaves to 100 %: so near, a fit is borderline
 _BLOCKS = 50  # with fewer, the residual tests find nothing
 _NEAR = 0.15  # how near to such a factor is suspicious
+_OF_A_UNIT = 2.0  # times 1000, or its part: what friction takes of a velocity is no reason to miss it
 _FEW = 0.1  # share of lags beyond the plain band that is still called white
 _NEGLIGIBLE = 99.8  # %: of a free run's fit, for what a structure lacks
 
@@ -185,7 +188,8 @@ def _scale(a: Assessment, bands: Bands) -> Iterator[Reason]:
     if a.gain is None or all(passes(a, bands)):
         return
     for factor, meaning in _FACTORS.items():
-        if abs(a.gain / factor - 1.0) < _NEAR:
+        ratio, steep = a.gain / factor, abs(log10(abs(factor))) >= 3.0
+        if 1.0 / _OF_A_UNIT < ratio < _OF_A_UNIT if steep else abs(ratio - 1.0) < _NEAR:
             text = f"the measured velocity is {a.gain:.4g} times the model's: {meaning}"
             yield Reason(Side.AGAINST, "sign" if factor < 0.0 else "unit", text)
             return

@@ -56,15 +56,16 @@ class DataView:
         )
         self._known.observe(self._picked, "value")
         self._upload = FileImport("Import a file", _IMPORT, self._imported, self.notice)
-        self._map = widgets.Textarea(rows=10, tooltip="", layout=widgets.Layout(width="100%"))
+        self._map = widgets.Textarea(rows=10, tooltip="", layout=widgets.Layout(width="calc(100% - 4px)"))
+        self._map_says = Html("")
         self._map_box = widgets.VBox(
             [
-                Html("What its columns mean is not clear. Correct this map, and save it:"),
+                self._map_says,
                 self._map,
                 button("Save map", "Write it beside the data, and describe again", self._keep_map, self.notice),
             ]
         )
-        self._map_box.layout.display = "none"
+        self._offer_map("")
         side = [self._data_step(), self._fit_step(), self._validation_step()]
         self.widget = columns(side, [self.bar, self.notice, self._map_box, self.text, self.figure])
         self._refresh()
@@ -95,6 +96,7 @@ class DataView:
     def describe(self) -> None:
         """What the file holds."""
         self._begin(self.state.describe, self._show_description)
+        self._offer_map(self.state.map_text())  # which may be why nothing is described
 
     def fit(self) -> None:
         """Estimate."""
@@ -120,7 +122,7 @@ class DataView:
     def _begin(self, start: Callable[[], Task[Any]], show: Callable[[Any], None]) -> None:
         def begin() -> Task[Any]:
             task = start()
-            self._map_box.layout.display = "none"
+            self._offer_map("")
             return task
 
         follow(self.bar, self.notice, begin, show)
@@ -147,8 +149,7 @@ class DataView:
         else:
             self.notice.say(f"{found.path.name} cannot be used as it is: see below", "error")
         if found.draft:
-            self._map.value = found.draft
-            self._map_box.layout.display = ""
+            self._offer_map(found.draft, drafted=True)
         if found.logs:
             self.figure.show(overview(found.logs), self.shell.session)
         else:
@@ -174,6 +175,16 @@ class DataView:
         self.text.value = in_fields(fragment(validation, pictures=False))
         self.notice.say(validation.verdict.sentence, "good" if validation.verdict.ok else "warning")
         self.figure.show(overlay(next(iter(validation.assessments.values()))), self.shell.session)
+
+    def _offer_map(self, text: str, drafted: bool = False) -> None:
+        """Let a map be corrected; none, where `text` is empty."""
+        self._map.value = text
+        self._map_says.value = (
+            "What its columns mean is not clear. Correct this map, and save it:"
+            if drafted
+            else "What its columns mean, by the map beside it. Where it is wrong, correct and save it:"
+        )
+        self._map_box.layout.display = "" if text else "none"
 
     def _keep_map(self) -> None:
         self.state.keep_map(self._map.value)

@@ -80,6 +80,17 @@ class DataState:
 
         return self.session.work(f"describe {path.name}", work, own_code=True)
 
+    def map_text(self) -> str:
+        """The map beside the chosen file, which may be wrong; empty where there is none, or another one is named."""
+        from rds.identification.logs.guess import map_path
+
+        if not self.choices["file"] or self.choices["map"]:
+            return ""
+        try:
+            return map_path(self.session.folder / self.choices["file"]).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return ""
+
     def keep_map(self, text: str) -> Path:
         """Write `text` as the map beside the chosen file, after it was tried; InputError says what is wrong in it."""
         from rds.core.atomic import write_whole
@@ -201,15 +212,10 @@ def _fields() -> Iterable[Field]:
 
 def _may_be_log(path: Path) -> bool:
     """Whether it is a file, and not what a run has made of a part program."""
-    from rds.nc.compiled_file import MAGIC
+    from rds.nc.compiled_file import is_ours
 
-    if not path.is_file():
-        return False
-    if path.suffix.lower() != ".dat":
-        return True
     try:
-        with path.open("rb") as file:
-            return file.read(len(MAGIC)) != MAGIC
+        return path.is_file() and (path.suffix.lower() != ".dat" or not is_ours(path))
     except OSError:
         return False
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -154,7 +155,7 @@ class Traced:
         off = f"; at most {self.outline.deviation:.3f} mm off the traced outline" if self.smoothed else ""
         size = ", ".join(f"{axis} {low:.2f} to {high:.2f}" for axis, (low, high) in found["extent_mm"].items())
         return (
-            f"{rings} outline{'s' * (rings > 1)}, {found['lines']} lines, {found['arcs']} arcs, "
+            f"{rings} outline{'s' * (rings > 1)}, lines: {found['lines']}, arcs: {found['arcs']}, "
             f"{found['length_mm']:.1f} mm, {found['cutting_time_s']:.0f} s at the feed{off}; {size} mm"
         )
 
@@ -221,7 +222,10 @@ class Drawing:
         """A picture from elsewhere into the folder, and chosen; InputError where that will not do."""
         plain = Path(name.replace("\\", "/")).name
         if Path(plain).suffix.lower() not in PICTURES or plain.startswith(".") or not plain.isprintable():
-            raise InputError(f"{plain!r:.60} is no picture that can be traced; {', '.join(PICTURES)} can")
+            known = f"{', '.join(PICTURES)} can"
+            if Path(plain).suffix.lower() in (".svg", ".dxf"):
+                known += f"; a drawing of lines is cut as it is: `rds nc make job {shlex.quote(plain)}` in a terminal"
+            raise InputError(f"{plain!r:.60} is no picture that can be traced; {known}")
         if len(data) > LARGEST:
             raise InputError(f"{plain} has more than {LARGEST >> 20} MB; scale it down")
         path = self.session.folder / plain

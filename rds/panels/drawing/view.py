@@ -72,6 +72,7 @@ class DrawingView:
         self.notice.say(f"{name} is in your folder", "good")
 
     def _chosen(self, name: str) -> None:
+        self.notice.clear()  # it was about what was chosen before
         if name == "cells" and self.cells.text != self.drawing.choices["cells"]:
             self.cells.text = str(self.drawing.choices["cells"])
         elif name == "source":

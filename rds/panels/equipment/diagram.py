@@ -62,14 +62,18 @@ def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]
     model = Block("model", f"Model of {names}", _of_each(axes, lambda each: _model(table, each, words)), column + 1)
     resolution = _of_each(axes, lambda each: (f"{each.resolution:g} {each.unit} per count",))
     encoder = Block("encoder", "Encoder", resolution, column + 2)
-    measured = f"y [{axis.unit}]"
+    measured, moved = f"y [{axis.unit}]", f"x [{axis.unit}]"
     if mode.moves_machine:
         blocks += [
             Block("converter", "CAN command", (_nodes(axes), *converter), column),
             Block("machine", f"Machine, {_name(axes)}", _of_each(axes, _travel), column + 1),
             encoder,
         ]
-        links += [Link(acting, "converter", "u [V]"), Link("converter", "machine", "V"), Link("machine", "encoder", "")]
+        links += [
+            Link(acting, "converter", "u [V]"),
+            Link("converter", "machine", "V"),
+            Link("machine", "encoder", moved),
+        ]
         if mode.modelled:
             blocks.append(Block("model", model.title, model.lines, column + 1, row=1))
             links.append(Link("converter", "model", "same voltage [V]"))
@@ -77,7 +81,7 @@ def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]
             links.append(Link("model", "beside", ""))
     else:
         blocks += [Block("converter", "Converter", converter, column), model, encoder]
-        links += [Link(acting, "converter", "u [V]"), Link("converter", "model", "V"), Link("model", "encoder", "")]
+        links += [Link(acting, "converter", "u [V]"), Link("converter", "model", "V"), Link("model", "encoder", moved)]
         if mode.real_time:
             blocks.append(
                 Block("drivers", "CAN drivers", ("run and timed,", "data not used"), column + 1, row=1, quiet=True)

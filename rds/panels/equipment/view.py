@@ -30,6 +30,7 @@ from rds.panels.session.session import RUNS
 from rds.results import Result, html
 
 TABS = ("Live", "Code", "Results", "Timing", "What runs", "Earlier runs")
+_BEGINS = "the run begins"  # until there are samples
 _STOPPED = "stopped; nothing was checked or loaded"
 LIVE, CODE, RESULTS, TIMING, WHAT, EARLIER = range(len(TABS))
 
@@ -122,7 +123,7 @@ class EquipmentView:
 
     def _follow(self, run: EquipmentRun | TakenUpRun) -> None:
         self.run, self._shown = run, None
-        self.notice.say("the run begins")
+        self.notice.say(_BEGINS)
         self.tabs.selected_index = LIVE
         self.results.clear()
         self.live.follow(run)
@@ -206,6 +207,8 @@ class EquipmentView:
         run = self.run
         assert run is not None
         self.live.look()
+        if run.share:  # the bar beside it says how far it is
+            self.notice.take_back(_BEGINS)
         if run.result is not None and self._shown is None:
             self._show(run.result)
 

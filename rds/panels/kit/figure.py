@@ -39,6 +39,7 @@ class FigureView(widgets.VBox):
         self._width = WIDTH  # inches of DPI pixels, until the page says how wide its place is
         self._made_for = WIDTH  # inches, of the figure
         self._room: _Room | None = None
+        self._name = ""  # of the figure, which is read out in place of its canvas
         self.figure: Any = None
         self._waiting: Any = None
         self._drawing: Html | None = None  # what is said meanwhile
@@ -55,6 +56,7 @@ class FigureView(widgets.VBox):
         self._made_for = figure.get_figwidth()
         figure.set_figwidth(min(self._width, self._made_for))
         self.figure = figure
+        self._name = _name(figure)
         words = [Html(f"<p>{caption}</p>")] if caption else []
         self._put(_canvas(figure), *words)
 
@@ -122,6 +124,7 @@ class FigureView(widgets.VBox):
         box = widgets.VBox(shown)
         self._shown = [*shown, box]
         self._room = self._room or _Room(self._fit)
+        self._room.name = self._name
         if self._drawing is not None:
             self._drawing.value = ""
         self.children = [*self._standing(), box]
@@ -144,9 +147,13 @@ class FigureView(widgets.VBox):
 
 
 class _Room(anywidget.AnyWidget):
-    """Invisible; calls `told(pixels)` with the width of its place, each time that it is another one."""
+    """Invisible; calls `told(pixels)` with the width of its place, each time that it is another one.
+
+    The canvas beside it is called `name`.
+    """
 
     _esm = traitlets.Unicode().tag(sync=True)
+    name = traitlets.Unicode("").tag(sync=True)
 
     def __init__(self, told: Callable[[float], None]):
         super().__init__(_esm=static(__file__, "room.js"))
@@ -158,6 +165,12 @@ class _Room(anywidget.AnyWidget):
         width = content.get("width") if isinstance(content, dict) and content.get("kind") == "width" else None
         if isinstance(width, int | float) and not isinstance(width, bool) and math.isfinite(width):
             self._told(float(width))
+
+
+def _name(figure: Any) -> str:
+    """What a figure shows, by its title and those of its axes, or what they are of."""
+    titles = [figure.get_suptitle(), *(axes.get_title() or axes.get_ylabel() for axes in figure.axes)]
+    return ", ".join(dict.fromkeys(filter(None, titles)))
 
 
 def _canvas(figure: Any) -> widgets.DOMWidget:

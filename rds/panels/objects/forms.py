@@ -12,6 +12,7 @@ from typing import Any, get_args, get_type_hints
 from rds.core import quantities
 from rds.core.errors import InputError
 from rds.core.quantities import Quantity
+from rds.nc.compiled_file import is_ours
 from rds.nc.paths.numbers import BLEND, DECIMALS, HEIGHT, SPINDLE
 from rds.nc.paths.objects import FEED, OBJECTS, File, Numbers, numbers
 from rds.panels.program.text import check_name
@@ -103,10 +104,10 @@ def _field(said: Any, key: str, label: str, first: Any, default: Any, folder: Pa
 
 def _point_files(folder: Path) -> dict[str, str]:
     try:
-        found = sorted(each.name for each in folder.iterdir() if each.suffix.lower() in POINT_FILES and each.is_file())
+        found = sorted(each for each in folder.iterdir() if each.suffix.lower() in POINT_FILES and each.is_file())
     except OSError:
         found = []
-    return {name: name for name in found if not name.startswith(".")}
+    return {each.name: each.name for each in found if not each.name.startswith(".") and not is_ours(each)}
 
 
 def check_numbers(said: Numbers, name: str, text: str) -> None:

@@ -43,7 +43,7 @@ class MadeObject:
         off = f"; at most {self.deviation:.4f} mm off" if self.deviation else ""
         size = ", ".join(f"{axis} {low:.4g} to {high:.4g}" for axis, (low, high) in found["extent_mm"].items())
         return (
-            f"{found['lines']} lines, {found['arcs']} arcs, {found['length_mm']:.2f} mm, "
+            f"lines: {found['lines']}, arcs: {found['arcs']}, {found['length_mm']:.2f} mm, "
             f"{found['cutting_time_s']:.1f} s at the feed{off}; {size} mm"
         )
 

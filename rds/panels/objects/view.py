@@ -58,6 +58,7 @@ class ObjectsView:
         self.shell.open("program")
 
     def _chosen(self, name: str) -> None:
+        self.notice.clear()  # it was about what was chosen before
         if name == "object":
             self._arrange()
 

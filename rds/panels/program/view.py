@@ -38,6 +38,7 @@ from rds.panels.scene.scene import MachineScene
 from rds.results import Result
 
 TABS = ("Preview", "Machine", "Result", "Steps", "Touch off", "MDI", "Nodes", "Settings, tools")
+_BEGINS = "the run begins"  # until there are samples
 PREVIEW, MACHINE, RESULT, STEP, SETUP, MDI, NODES, SETTINGS = range(len(TABS))
 
 
@@ -221,7 +222,7 @@ class ProgramView:
         self._uncut = None
         self.editor.locked = True
         self.result.clear()
-        self.notice.say("the run begins")
+        self.notice.say(_BEGINS)
         if self.tabs.selected_index not in (PREVIEW, MACHINE, MDI):
             self.tabs.selected_index = PREVIEW
         self.operator.enable()
@@ -241,6 +242,8 @@ class ProgramView:
         if self._traced and len(rows := work.new_rows()):
             self.strip.add(rows[:, : self._wide])
             self.scene.add(np.delete(rows, np.s_[1 : self._wide - 1], axis=1))  # time, contour error, the motion
+        if work.status() is not None:
+            self.notice.take_back(_BEGINS)
         if work.result is not None and not self._shown:
             self._show(work)
 

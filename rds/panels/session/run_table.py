@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.atomic import write_whole
+from rds.modes.loop.changes import STOP
 from rds.panels.code.versions import change_sentence
 from rds.panels.session.kept_runs import KeptRun, State
 
@@ -204,7 +205,7 @@ def _facts(head: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(own := choices.get("controller"), Mapping):
         facts |= {key: value for key, value in _flat(own, " ") if key not in ("name", "file", *_PARTS)}
     facts |= {key: value for key, value in _flat(choices) if key not in facts}
-    if changes := meta.get("changes"):
+    if changes := [change for change in meta.get("changes", ()) if change[1] != STOP]:
         facts["changed while it ran"] = len(changes)
     return facts
 
