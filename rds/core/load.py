@@ -284,7 +284,10 @@ def missing_param(error: BaseException, params: Mapping[str, Any], source: Sourc
 
 def _is_of_another_dict(error: BaseException, key: str, params: Mapping[str, Any]) -> bool:
     """Whether the line that failed looks into a dict of other keys than those of `params`, and without this one."""
-    *_, (frame, number) = traceback.walk_tb(error.__traceback__)
+    frames = list(traceback.walk_tb(error.__traceback__))
+    if not frames:
+        return False
+    frame, number = frames[-1]
     names = re.findall(r"(\w+)\s*\[", linecache.getline(frame.f_code.co_filename, number))
     dicts = [each for name in names if type(each := frame.f_locals.get(name, frame.f_globals.get(name))) is dict]
     return any(key not in each and each.keys() != params.keys() for each in dicts)
