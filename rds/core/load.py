@@ -34,6 +34,7 @@ __all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "st
 
 _DECLARES = re.compile(rb"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")  # the encoding of a file of Python, PEP 263
 _NUMBERS = (int, float)
+_LONGEST_NAME = 100  # characters of a parameter
 _LARGEST = 10_000_000  # bytes; a file of data, not of code
 
 
@@ -269,7 +270,8 @@ def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source:
 def missing_param(error: BaseException, params: Mapping[str, Any], source: Source | None) -> str:
     """How to define the parameter for want of which control() failed; empty where it was not that."""
     key = error.args[0] if isinstance(error, KeyError) and error.args else None
-    return "" if not isinstance(key, str) or key in params else how_to_define("params", f"{{{key!r}: 1.0}}", source)
+    is_name = isinstance(key, str) and len(key) <= _LONGEST_NAME and key not in params
+    return "" if not is_name else how_to_define("params", f"{{{key!r}: 1.0}}", source)
 
 
 def how_to_define(name: str, example: str, source: Source | None) -> str:

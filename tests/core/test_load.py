@@ -378,3 +378,34 @@ def test_an_empty_file_is_called_empty(tmp_path: Path) -> None:
     file.write_text("\n")
     with pytest.raises(InputError, match=r"law\.py: it is empty; save your code in the editor"):
         load_student(file)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "raise TypeError(Mute())",
+        "raise Meta('x')",
+        "raise SyntaxError('a', (3, 4, 5, 6))",
+        "error = SyntaxError('a'); error.filename, error.text, error.msg = __file__, 5, 7; raise error",
+        "raise KeyError('x' * 10**6)",
+    ],
+)
+def test_no_exception_of_a_students_own_ends_what_reports_it(tmp_path: Path, line: str) -> None:
+    """One that cannot be printed, has no name, or names no file; and a key of 10^6 letters, which is no parameter."""
+    file = tmp_path / "law.py"
+    file.write_text(
+        "class Mute:\n    def __repr__(self): raise RuntimeError\n"
+        "class Nameless(type):\n    __name__ = property(lambda self: 1 / 0)\n"
+        "class Meta(Exception, metaclass=Nameless): pass\n"
+        + line
+        + "\ndef control(t, r, y, state, params): return 0.0, state\n"
+    )
+    with pytest.raises(InputError) as caught:
+        load_student(file)
+    assert str(file) in str(caught.value) and len(str(caught.value)) < 1000
+    text = file.read_text().replace(line, "").replace("return 0.0, state", line.replace("__file__", "None"))
+    file.write_text(text)
+    law = load_student(file)
+    with pytest.raises(Exception) as raised:
+        law.controller().control(0.0, Reference(0.0, 0.0, 0.0), 0.0, None, {})
+    assert len(student_error(raised.value, file)) < 1000
