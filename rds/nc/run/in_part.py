@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.shared_quantities import TIED_FEED
 from rds.interpolators.motion.segments import AXES, EXACT_STOP, JOINTS, line
 from rds.modes.loop.program import STEP, Program, ProgramEvent
 from rds.nc.path_block import Event, PathBlock
@@ -72,8 +73,12 @@ def _approach(first: np.ndarray, top: float, latest: dict[str, Event], tool: int
         cuts = end is target and not first["rapid"]
         rate = float(first["rate"]) if cuts else _FASTEST
         moves.append(line(start.tolist(), end.tolist(), rate, rapid=not cuts, mode=EXACT_STOP, program_line=number))
-    events = [latest[kind]._replace(after=-1) for kind in _KEPT if kind in latest]
     segments = np.concatenate(moves) if moves else np.zeros(0, first.dtype)
+    # tied to the spindle is the thread alone: on the way there an operator may hold, slow down and go home
+    ties = [kind for kind, event in latest.items() if kind == "override" and event.value == TIED_FEED]
+    events = [
+        latest[kind]._replace(after=len(segments) - 1 if kind in ties else -1) for kind in _KEPT if kind in latest
+    ]
     return PathBlock(segments, events, tool=tool)
 
 
