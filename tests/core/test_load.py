@@ -343,6 +343,15 @@ def test_a_notebook_shows_the_users_lines_and_the_message_of_an_error() -> None:
     assert len(shown) == 2 and shown[0].startswith("test_load.py, line ") and 'role="control"' in shown[0]
     assert "ContractError" in shown[1] and shown[1].endswith(str(broken.value))
 
+    def deep(left: int) -> None:
+        if not left:
+            raise InputError("deep")
+        deep(left - 1)
+
+    with pytest.raises(InputError) as deep_down:
+        deep(500)
+    assert len(deep_down.value._render_traceback_()) == 4  # a line that calls itself is said once
+
 
 def test_a_function_of_a_notebook_is_told_how_its_params_go_with_it() -> None:
     """Those of the cell are not looked at, so "define them" sent round in a circle who had."""
