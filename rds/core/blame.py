@@ -16,7 +16,9 @@ STUDENT_ERRORS = (Exception, SystemExit)
 
 _ARRAYS_AS_NUMBERS = ("only 0-dimensional arrays can be converted", "inhomogeneous shape")  # numpy's words
 _FROM_THE_CLOCK = re.compile(r"(?:/|//|%)\s*\(?\s*t\b")  # divided by what the time t stands in
+_TUPLE_FOR_NUMBER = "can't multiply sequence by non-int of type 'float'"
 _OF_REFERENCE = re.compile(r"'float' object has no attribute '(?:position|velocity|acceleration)'")
+_UNPRINTABLE = "(its message cannot be printed)"
 _LONGEST = 300  # characters of an exception's own text; some print whole arrays
 
 
@@ -29,7 +31,14 @@ def student_error(exc: BaseException, path_or_source: str | Path | Source | None
     "file.py, line 12, in control: ZeroDivisionError: division by zero: `u = 1 / y`".
     """
     path = path_or_source.path if isinstance(path_or_source, Source) else path_or_source
-    if isinstance(exc, SyntaxError) and exc.filename:
+    try:
+        return _student_error(exc, path)
+    except STUDENT_ERRORS:  # its class is the student's own, or it was made with what it never holds else
+        return f"{type.__repr__(type(exc))}: {_UNPRINTABLE}"
+
+
+def _student_error(exc: BaseException, path: str | Path | None) -> str:
+    if isinstance(exc, SyntaxError) and exc.filename and isinstance(exc.filename, str):
         line = (exc.text or "").strip()
         return _sentence(f"{Path(exc.filename).name}, line {exc.lineno}", type(exc).__name__, exc.msg, line)
     own = _own_frames(exc, path)
@@ -53,7 +62,7 @@ def is_students(exc: BaseException) -> bool:
 
 def student_line(exc: BaseException, path: str | Path) -> int | None:
     """The number of the innermost line of the file `path` on the way to `exc`."""
-    if isinstance(exc, SyntaxError) and exc.filename and Path(exc.filename) == Path(path):
+    if isinstance(exc, SyntaxError) and isinstance(exc.filename, str) and Path(exc.filename) == Path(path):
         return exc.lineno
     numbers = [frame.lineno for frame in extract_tb(exc.__traceback__) if Path(frame.filename) == Path(path)]
     return numbers[-1] if numbers else None
@@ -75,14 +84,14 @@ def _is_own(filename: str, path: str | Path | None) -> bool:
 
 def is_tuple_for_number(exc: BaseException) -> bool:
     """Whether a number was multiplied with a list or tuple, such as 30,0 with a decimal comma."""
-    return isinstance(exc, TypeError) and "can't multiply sequence by non-int of type 'float'" in str(exc)
+    return isinstance(exc, TypeError) and _TUPLE_FOR_NUMBER in _text(exc)
 
 
 def _text(exc: BaseException) -> str:
     try:
-        text = " ".join(str(exc).split())
+        text = " ".join(str(exc)[: 10 * _LONGEST].split())
     except STUDENT_ERRORS:  # an exception class of the student's own may fail to print itself
-        text = "(its message cannot be printed)"
+        text = _UNPRINTABLE
     text = text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
     if isinstance(exc, TypeError | AttributeError) and "'Reference'" in text:
         return f"{text} (r.position, r.velocity and r.acceleration are its numbers)"
@@ -98,7 +107,7 @@ def _text(exc: BaseException) -> str:
         return f"{text} (a function forgets its variables after each call: what is to last goes through `state`)"
     if type(exc) is TypeError and "'float' object is not subscriptable" in text:
         return f"{text} (it is one number, as r.position and y are with one axis: leave the [...] out)"
-    if type(exc) is TypeError and is_tuple_for_number(exc):
+    if type(exc) is TypeError and _TUPLE_FOR_NUMBER in text:
         return f"{text} (a list or tuple stands where a number belongs; 30,0 is a tuple, 30.0 a number)"
     return f"{text} (the dict has no such key)" if type(exc) is KeyError else text  # its own text is the key alone
 

@@ -14,7 +14,7 @@ class RdsError(Exception):
         from rds.core.traceback_frames import is_installed, place_of
 
         own = [frame for frame in extract_tb(self.__traceback__) if not is_installed(frame.filename)]
-        lines = [f"{place_of(frame)}: {frame.line}" for frame in own]
+        lines = dict.fromkeys(f"{place_of(frame)}: {frame.line}" for frame in own)  # a recursion has one many times
         return [*lines, f"\x1b[31m{type(self).__name__}\x1b[0m: {self}"]
 
 

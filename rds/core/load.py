@@ -37,6 +37,7 @@ __all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "st
 
 _DECLARES = re.compile(rb"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")  # the encoding of a file of Python, PEP 263
 _NUMBERS = (int, float)
+_LONGEST_NAME = 100  # characters of a parameter
 _LARGEST = 10_000_000  # bytes; a file of data, not of code
 
 
@@ -274,7 +275,7 @@ def missing_param(error: BaseException, params: Mapping[str, Any], source: Sourc
     that.
     """
     key = error.args[0] if isinstance(error, KeyError) and error.args else None
-    if not isinstance(key, str) or key in params or _is_of_another_dict(error, key, params):
+    if not isinstance(key, str) or len(key) > _LONGEST_NAME or key in params or _is_of_another_dict(error, key, params):
         return ""
     spelt = {str(name).lower(): str(name) for name in params}
     if alike := get_close_matches(key.lower(), spelt, n=1):

@@ -71,9 +71,9 @@ def load_error(error: BaseException, file: Path) -> InputError:
     """What `file` raised while it was run as a module, with its place and the remedy."""
     line = student_line(error, file)
     where = f"{file}:{line}" if line else str(file)
-    if isinstance(error, SyntaxError) and Path(error.filename or "") == file:
-        text = (error.text or "").strip()
-        remedy = next((each for said, each in _SYNTAX.items() if re.search(said, error.msg or "")), "")
+    if isinstance(error, SyntaxError) and isinstance(error.filename, str) and Path(error.filename) == file:
+        text = str(error.text or "").strip()
+        remedy = next((each for said, each in _SYNTAX.items() if re.search(said, str(error.msg))), "")
         said = f"syntax error: {error.msg}{remedy}{f': `{text}`' if text else ''}"
         return InputError(f"{said}; {_PYTHON} cannot read it", where)
     if line is None and isinstance(error, MemoryError | RecursionError):  # the parser's: no line of it has run

@@ -356,6 +356,15 @@ def test_a_notebook_shows_the_users_lines_and_the_message_of_an_error() -> None:
     assert len(shown) == 2 and shown[0].startswith("test_load.py, line ") and 'role="control"' in shown[0]
     assert "ContractError" in shown[1] and shown[1].endswith(str(broken.value))
 
+    def deep(left: int) -> None:
+        if not left:
+            raise InputError("deep")
+        deep(left - 1)
+
+    with pytest.raises(InputError) as deep_down:
+        deep(500)
+    assert len(deep_down.value._render_traceback_()) == 4  # a line that calls itself is said once
+
 
 def test_a_function_of_a_notebook_is_told_how_its_params_go_with_it() -> None:
     """Those of the cell are not looked at, so "define them" sent round in a circle who had."""
@@ -398,3 +407,34 @@ def test_an_empty_file_is_called_empty(tmp_path: Path) -> None:
     file.write_text("\n")
     with pytest.raises(InputError, match=r"law\.py: it is empty; save your code in the editor"):
         load_student(file)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "raise TypeError(Mute())",
+        "raise Meta('x')",
+        "raise SyntaxError('a', (3, 4, 5, 6))",
+        "error = SyntaxError('a'); error.filename, error.text, error.msg = __file__, 5, 7; raise error",
+        "raise KeyError('x' * 10**6)",
+    ],
+)
+def test_no_exception_of_a_students_own_ends_what_reports_it(tmp_path: Path, line: str) -> None:
+    """One that cannot be printed, has no name, or names no file; and a key of 10^6 letters, which is no parameter."""
+    file = tmp_path / "law.py"
+    file.write_text(
+        "class Mute:\n    def __repr__(self): raise RuntimeError\n"
+        "class Nameless(type):\n    __name__ = property(lambda self: 1 / 0)\n"
+        "class Meta(Exception, metaclass=Nameless): pass\n"
+        + line
+        + "\ndef control(t, r, y, state, params): return 0.0, state\n"
+    )
+    with pytest.raises(InputError) as caught:
+        load_student(file)
+    assert str(file) in str(caught.value) and len(str(caught.value)) < 1000
+    text = file.read_text().replace(line, "").replace("return 0.0, state", line.replace("__file__", "None"))
+    file.write_text(text)
+    law = load_student(file)
+    with pytest.raises(Exception) as raised:
+        law.controller().control(0.0, Reference(0.0, 0.0, 0.0), 0.0, None, {})
+    assert len(student_error(raised.value, file)) < 1000

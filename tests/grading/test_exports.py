@@ -22,9 +22,10 @@ from rds.grading.exports import GRADEBOOKS, prairielearn
 from rds.grading.exports.export import Written, export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.exports.one_json import LARGEST
+from rds.grading.exports.roster import Key, find, identifiers, names_here, read_sheet
 from rds.grading.feedback.plain_text import LONGEST as MOST
 from rds.grading.feedback.plain_text import cell, uncell
-from rds.grading.grade import Grade, Status
+from rds.grading.grade import LISTED, Grade, Status
 from tests.grading.grades import HOSTILE, batch_in, grade, score
 
 NOTHING = ExportOptions()
@@ -470,3 +471,17 @@ def test_the_command_lists_who_is_left_out(tmp_path: Path) -> None:
     told = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
     assert told["students"] == 1 and list(told["left_out"]) == ["nobody"]
     assert CliRunner().invoke(app, ["grade", "export", str(out), "--to", "word"]).exit_code == 2
+
+
+def test_points_go_to_nobody_whose_identifier_is_what_another_handed_in_as(tmp_path: Path) -> None:
+    """`miller` of the class list's s1 is not the user `miller`; and each name of a file without a gradebook is once."""
+    book = tmp_path / "book.csv"
+    book.write_text(
+        "Last Name,First Name,Username,Student ID,Tracking [Total Pts: 30] |7\nM,A,miller,s2,\nM,B,am,s1,\n"
+    )
+    mine = grade("miller", details={LISTED: "s1"})
+    sheet = read_sheet(book)
+    keys = [Key("Username", identifiers), Key("Student ID", identifiers)]
+    assert find([mine], sheet, keys) == ({1: mine}, {})
+    others = [grade("s9", details={LISTED: "x"}), grade("b", details={LISTED: "x"}), grade("c", details={LISTED: "b"})]
+    assert names_here([mine, *others]) == {"miller": "s1", "s9": "s9", "b": "b", "c": "c"}

@@ -221,3 +221,15 @@ def test_a_log_whose_stamps_alternate_as_a_robot_s_is_fitted_by_both_methods(met
     assert found.values()["M"] == pytest.approx(M, rel=0.03)
     assert found.values()["F_v"] == pytest.approx(F_v, rel=0.03)
     assert any("times are irregular" in warning for warning in found.warnings) == (method == "inverse-dynamics")
+
+
+def test_readings_at_nearly_one_time_count_as_one() -> None:
+    """Where a network stamps two readings 1 ns apart, a spline through their noise goes far off: K was once 1.3e5."""
+    log = simulated(stairs())
+    time = log.time.copy()
+    twins = np.random.default_rng(0).choice(np.arange(10, len(time) - 10), 200, replace=False)
+    time[twins] = time[twins - 1] + 1e-9
+    log = replace(log, time=time)
+    found = fit([log], structure("axis"), "inverse-dynamics", {})
+    assert found.values()["K"] == pytest.approx(TRUTH["K"], rel=0.03)
+    assert found.values()["tau"] == pytest.approx(TRUTH["tau"], rel=0.1)

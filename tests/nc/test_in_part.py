@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from rds import open_result
 from rds.cli.main import app
 from rds.core.errors import InputError
+from rds.core.shared_quantities import TIED_FEED
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import STEP
 from rds.nc.run.run import PartProgram
@@ -76,3 +77,13 @@ def test_single_step_rests_after_each_line_that_moves(file: Path) -> None:
     for each in stops:
         assert not program.velocity[each.sample].any()
     assert [each.sample for each in program.happenings] == sorted(each.sample for each in program.happenings)
+
+
+def test_a_run_from_within_a_thread_may_be_held_on_the_way_there(file: Path) -> None:
+    """Only the thread is tied to its spindle: the way to it, a rapid move across, once was, and no hold ended it."""
+    file.write_text("G21 G90 G94\nM3 S100\nG0 X5 Z5\nG33 Z2 K1\nG33 Z-1 K1\nG0 Z8\nM2\n")
+    prepared = PartProgram(file, begin=5).prepared
+    assert prepared.path["line"].tolist() == [5, 5, 5, 5, 6]
+    tied = next(each for each in prepared.program.happenings if each.kind == "override")
+    assert tied.value == TIED_FEED
+    assert prepared.program.position[tied.sample][:3].tolist() == pytest.approx([5.0, 0.0, 2.0])

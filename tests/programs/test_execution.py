@@ -309,6 +309,10 @@ def test_a_thread_is_cut_at_the_feed_of_its_spindle() -> None:
     assert execute(last, [(begins * T + 0.3, "home", 1)]).reason == "went home from line 4"
     stop = execute(program, [(begins * T + 0.3, "stop", 1)])
     assert stop.reason == "stopped in line 2"
+    step = prepared(
+        PATH, Event(0, "override", TIED_FEED, 2), Event(1, "stop", 0, 3), Event(3, "override", FREE_FEED, 4)
+    )
+    assert execute(step, [(begins * T + 0.3, "home", 1)]).reason == "went home from line 3"
 
 
 @pytest.mark.parametrize("changes", [[("hold", 1), ("hold", 0)], [("override", 0.0), ("override", 1.0)]])

@@ -209,3 +209,29 @@ def test_sines_that_are_a_quarter_of_a_period_apart_are_a_circle(tmp_path: Path)
     (row,) = report.table("Circular test").rows
     assert row[1] == "counter-clockwise" and row[3] == pytest.approx(10.0) and row[2] >= 720
     assert "for lack of a circle clockwise" in " ".join(report.findings)
+
+
+def test_a_form_that_is_another_has_no_confident_cause(tmp_path: Path) -> None:
+    """The corners of a superellipse once were a reversal step of 1.8 mm, more than G itself."""
+    table = both_ways()
+    table[:, 1:] = RADIUS * np.sign(table[:, 1:]) * np.abs(table[:, 1:] / RADIUS) ** 0.9
+    report = report_of(tmp_path, table)
+    assert not causes(report)
+    assert "it is noise, or has another cause" in report.findings[-1]
+
+
+def test_a_reading_that_is_off_and_a_drift_are_no_friction(tmp_path: Path) -> None:
+    """A spike stands at most reversals of its axis; these once were spikes of 250 and 3 µm."""
+    glitch, drift = both_ways(), both_ways()
+    glitch[len(glitch) // 4, 1] += 1.0
+    drift[:, 1] += np.linspace(0.0, 0.02, len(drift))
+    for table in (glitch, drift):
+        assert not {"reversal spike"} & {cause for cause, _ in causes(report_of(tmp_path, table))}
+
+
+@pytest.mark.filterwarnings("error")
+def test_times_that_stand_still_are_no_steady_feed(tmp_path: Path) -> None:
+    table = both_ways()
+    table[:, 0] = 0.0
+    with pytest.raises(InputError, match="0° of a circle at a steady feed"):
+        report_of(tmp_path, table)

@@ -62,7 +62,9 @@ def _write(gradebook: Any, finished: Finished, wanted: ExportOptions) -> Exporte
     unmatched: dict[str, str] = {}
     called = names_here(finished.to_hand_on)
     for grade in finished.to_hand_on:
-        student = called[grade.student] if called[grade.student] in known or not known else grade.student
+        student = called[grade.student]
+        if known and student not in known and grade.student not in called.values():  # who may be somebody else
+            student = grade.student
         if known and student not in known:
             unmatched[grade.student] = "no student of the gradebook has this identifier"
             continue

@@ -6,7 +6,7 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rds.core.errors import InputError
@@ -121,10 +121,13 @@ def _by_cell(sheet: Sheet, key: Key) -> Mapping[str, list[int]]:
 
 
 def _rows_of(grade: Grade, tables: Sequence[tuple[Key, Mapping[str, list[int]]]]) -> tuple[list[int], str]:
-    for key, table in tables:
-        for value in key.of_grade(grade):
-            if rows := table.get(compared(key.of_row(value))):
-                return rows, key.column
+    # by the class list's identifier in every column, before what was handed in may be another student's name in one
+    for called in dict.fromkeys((identifiers(grade)[0], grade.student)):
+        known = replace(grade, student=called)
+        for key, table in tables:
+            for value in key.of_grade(known):
+                if rows := table.get(compared(key.of_row(value))):
+                    return rows, key.column
     return [], ""
 
 
@@ -151,8 +154,9 @@ def names_here(grades: Iterable[Grade]) -> dict[str, str]:
     one student's, else that of what was handed in.
     """
     best = {grade.student: identifiers(grade)[0] for grade in grades}
-    counts = Counter(best.values())
-    return {student: name if counts[name] == 1 else student for student, name in best.items()}
+    while several := [name for name, count in Counter(best.values()).items() if count > 1]:
+        best = {student: student if name in several else name for student, name in best.items()}
+    return best
 
 
 def source(grade: Grade, *names: str) -> list[str]:

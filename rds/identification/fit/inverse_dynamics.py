@@ -49,6 +49,7 @@ OPTIONS = {
 }
 _REST = 2  # decimated samples within which an axis at rest moves no more than one step of its encoder
 _LEAST = 5  # rows for each coefficient
+_ONE = 0.1  # sample periods: readings that are nearer count as one, their mean
 _BRIDGED = 3.0  # sample periods: a longer step is a gap, within which the motion is not known
 
 
@@ -249,11 +250,13 @@ def _regular(log: Log, is_held: bool) -> Log:
             log.source or log.name,
         )
     grid = np.linspace(log.time[0], log.time[-1], len(log))
+    group = np.cumsum(np.concatenate([[0], steps >= _ONE]))  # a spline through two readings at one time goes far off
+    time, position = (np.bincount(group, each) / np.bincount(group) for each in (log.time, log.position))
     command = np.interp(grid, log.time, log.command)
     if is_held:
         so_far = np.concatenate([[0.0], np.cumsum(log.command[:-1] * np.diff(log.time))])
         command[:-1] = np.diff(np.interp(grid, log.time, so_far)) / (grid[1] - grid[0])
-    return replace(log, time=grid, command=command, position=CubicSpline(log.time, log.position)(grid), extra={})
+    return replace(log, time=grid, command=command, position=CubicSpline(time, position)(grid), extra={})
 
 
 def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[np.ndarray, np.ndarray]:

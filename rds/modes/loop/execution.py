@@ -192,8 +192,8 @@ class Execution:
         return min(values[OVERRIDE] if self._feed == FREE_FEED else 1.0, self._allowed)
 
     def _leaves(self) -> bool:
-        """Whether the axes are to go home from where they rest."""
-        return bool(self._values[HOME]) and self._feed != TIED_FEED
+        """Whether the axes are to go home from where they rest; in a thread only where somebody is waited for."""
+        return bool(self._values[HOME]) and (self._feed != TIED_FEED or self.state is State.STOP)
 
     def _along_the_path(self, positions: Sequence[float]) -> None:
         follower, until, wanted = self._follower, self._until(), self._wanted()

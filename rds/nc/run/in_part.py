@@ -73,10 +73,10 @@ def _approach(first: np.ndarray, top: float, latest: dict[str, Event], tool: int
         cuts = end is target and not first["rapid"]
         rate = float(first["rate"]) if cuts else _FASTEST
         moves.append(line(start.tolist(), end.tolist(), rate, rapid=not cuts, mode=EXACT_STOP, program_line=number))
+    segments = np.concatenate(moves) if moves else np.zeros(0, first.dtype)
     events = [latest[kind]._replace(after=-1) for kind in _KEPT if kind in latest]
     if events and events[-1][1:3] == ("override", TIED_FEED):  # on the way to a thread a hold is no harm
-        events[-1] = events[-1]._replace(after=len(moves) - 1)
-    segments = np.concatenate(moves) if moves else np.zeros(0, first.dtype)
+        events[-1] = events[-1]._replace(after=len(segments) - 1)
     return PathBlock(segments, events, tool=tool)
 
 

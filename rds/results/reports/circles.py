@@ -171,8 +171,9 @@ def _one_way(spokes: np.ndarray, on: np.ndarray, time: np.ndarray | None) -> lis
         way = np.sign(_slope(_turning(spokes[stretch])))
         for part in np.split(stretch, np.flatnonzero(np.diff(way)) + 1):
             if time is not None and len(part) > 2:
-                rate = np.abs(_slope(_turning(spokes[part])) / _slope(time[part]))
-                steady = np.flatnonzero(np.abs(rate - np.median(rate)) <= _STEADY * np.median(rate))
+                with np.errstate(divide="ignore", invalid="ignore"):  # times that stand still are no steady feed
+                    rate = np.abs(_slope(_turning(spokes[part])) / _slope(time[part]))
+                    steady = np.flatnonzero(np.abs(rate - np.median(rate)) <= _STEADY * np.median(rate))
                 part = part[steady[0] : steady[-1] + 1] if len(steady) else part[:0]
             found.append(part)
     return found
