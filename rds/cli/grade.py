@@ -160,7 +160,7 @@ def _show_self(found: SelfCheck) -> None:
         note += f" {found.left_out} more {many} not tried here, worth {found.left_out_points:g} points."
     show_table("Self-check", ["criterion", "result", "value", "margin", "worth"], rows, note)
     for line in found.lines:
-        if line.sentence and line.word != "pass":
+        if line.sentence and line.word != "pass" and line.sentence.rstrip(".") != found.reason.rstrip("."):
             typer.echo(f"- {line.title}: {line.sentence}")
 
 

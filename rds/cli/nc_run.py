@@ -174,6 +174,11 @@ def run(
         if override < LEAST_OVERRIDE:
             said = f"--override {override:g} never moves, or as good as never; begin with {LEAST_OVERRIDE:g} or more"
             raise InputError(f"{said}, and hold with space or `rds nc operate --hold`")
+        if override <= 2.0:
+            typer.echo(
+                f"rds: --override {override:g} is in per cent; for {override:g} times the feed give {100 * override:g}",
+                err=True,
+            )
         if out is not None:  # before the program is checked and planned, which may take a while
             require_writable(out)
         experiment = Path(controller) if controller is not None and controller.endswith(".toml") else None

@@ -31,6 +31,15 @@ def sidecar(path: Path) -> Path:
     return path.with_suffix(".json")
 
 
+def description_beside(path: Path) -> dict[str, Any]:
+    """What a result says of itself, of a folder of one or of its table, without reading the table.
+
+    InputError or OSError where there is none.
+    """
+    beside = path / "result.json" if path.is_dir() else sidecar(path)
+    return parse(read_limited(beside, DESCRIPTION, "a description of a table", "move it away"))
+
+
 def writers(result: Result, path: Path) -> dict[Path, Callable[[BinaryIO], None]]:
     """What writes the table and its description; the description carries the table's SHA-256, so order matters."""
     digest = hashlib.sha256()

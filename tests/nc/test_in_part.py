@@ -42,7 +42,8 @@ def test_a_run_from_a_line_goes_up_across_and_down_and_cuts_the_rest(file: Path)
 def test_the_command_takes_both_and_what_holds_before_holds(file: Path, tmp_path: Path) -> None:
     file.write_text(PROGRAM.replace("M3 S1000", "M3 S1000 M49"))
     command = ["nc", "run", str(file), "--begin", "7", "--steps", "--override", "50", "--out", str(tmp_path / "out")]
-    assert CliRunner().invoke(app, command).exit_code == 0
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0 and "It was begun at line 7: of the lines before, tool" in done.output
     result = open_result(tmp_path / "out")
     assert set(result["program_line"]) == {2.0, 8.0, 9.0}
     assert State.STOP in result["program_state"]

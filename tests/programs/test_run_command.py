@@ -30,11 +30,15 @@ from rds.nc.run.judge import WAITS
 DOCUMENT = "docs/part-programs.md"
 TEXT = (Path(__file__).parents[2] / DOCUMENT).read_text(encoding="utf-8").partition("## Running")[2]
 COMMANDS = [
-    shlex.split(line)[1:] for block in blocks(DOCUMENT) if block.language == "sh" for line in block.text.splitlines()
+    shlex.split(line, comments=True)[1:]
+    for block in blocks(DOCUMENT)
+    if block.language == "sh"
+    for line in block.text.splitlines()
 ]
+CIRCLES = [command for command in COMMANDS if any("circular" in word for word in command)]  # one after the other
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+@pytest.mark.parametrize("command", [each for each in COMMANDS if each not in CIRCLES], ids=" ".join)
 def test_the_commands_of_the_document_work(command: list[str], part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(part.parent)
     (part.parent / "tools.tbl").write_text("T1 P1 Z12.0 D3.0\n")
@@ -57,6 +61,17 @@ def test_the_commands_of_the_document_work(command: list[str], part: Path, monke
     assert found["files"]["program"] == str(folder / "program.html")
 
 
+def test_the_circular_test_of_the_document_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    bundled, run, other_run, report = CIRCLES
+    assert run[:3] == other_run[:3]  # one of the two is enough
+    for command in (bundled, other_run, [word for word in report if word != "tracking"]):
+        done = CliRunner().invoke(app, command)
+        assert done.exit_code == 0, done.output
+    assert "pid: " in done.stdout
+    assert {"circular.html", "circular-circle-pid.png"} <= {path.name for path in Path("circles").iterdir()}
+
+
 def test_every_column_state_and_live_value_is_named() -> None:
     named = set(re.findall(r"`(\w+)`", TEXT))
     assert {*COLUMNS, "contour_error", *WAITS.values()} <= named
@@ -73,6 +88,7 @@ def test_every_column_state_and_live_value_is_named() -> None:
     [
         (["--mode", "system-test"], "mode system-test has no controllers"),
         (["--override", "250"], r"not in the range 0\.0<=x<=200\.0|less than or equal to 200"),  # by typer's version
+        (["--override", "1.5", "--mode", "system-test"], "is in per cent; for 1.5 times the feed give 150"),
         (["--override", "0"], "--override 0 never moves, or as good as never; begin with 0.1 or more, and hold"),
         (["--override", "1e-300"], "--override 1e-300 never moves, or as good as never"),
         (["--controller", "nonsense"], "nonsense"),

@@ -197,6 +197,11 @@ def test_the_program_on_the_mini_cnc_shows_the_friction_of_its_axes(tmp_path: Pa
     assert found.pop(("reversal step", "X")) == pytest.approx(42.0, abs=2.0)  # following errors of -12 and 30 µm
     assert found.pop(("reversal step", "Y")) == pytest.approx(51.0, abs=2.0)
     assert max(found.values(), default=0.0) < 2.0 and {name for name, _ in found} <= {"reversal spike"}
+    beside = tmp_path / "result.json"
+    beside.write_text(beside.read_text().replace('"ending": "done"', '"ending": "stopped", "verdict": "void"'))
+    (tmp_path / "result.parquet").unlink()  # that holds its own description
+    first, second, *_ = make_report("circular", [tmp_path / "result.csv"]).findings
+    assert "its timing is void: samples were late or left out" in first and "ended early (stopped)" in second
 
 
 def test_sines_that_are_a_quarter_of_a_period_apart_are_a_circle(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.shared_quantities import TIED_FEED
 from rds.interpolators.motion.planner import TOLERANCE
 from rds.interpolators.motion.segments import AXES, BLEND, JOINTS
 from rds.modes.loop.execution import State
@@ -58,6 +59,8 @@ def judged(result: Result, prepared: Prepared) -> Result:
         **({"path_error": worst(columns["path_error"], line, on_path, "mm")} if is_reference and linear else {}),
         **prepared.about,
         **({"outputs": list(prepared.outputs)} if prepared.outputs else {}),
+        **({"begun_at_line": prepared.begin} if prepared.begin else {}),
+        "own_feed": any(event.kind == "override" and event.value == TIED_FEED for event in prepared.events),
         **_force(result, worst, moves),
         "following_error": {
             name: found

@@ -71,6 +71,7 @@ class Prepared:
     about: dict[str, Any] = field(default_factory=dict)  # of a path as reference: what made its samples, for the result
     outputs: tuple[dict[str, Any], ...] = ()  # that are switched: name, value, planned sample, line
     events: tuple[Event, ...] = ()  # of the path, each after one of its segments
+    begin: int = 0  # line that it was begun at; 0: at its head
 
     @property
     def seconds(self) -> float:
@@ -138,7 +139,7 @@ def _of_compiled(
     if (found.path["tip"] != JOINTS).any():
         own, _ = configured(file, machine, setup.options)
         found = replace(found, tip=tip_path(found.path, own, setup.on(machine, file).correct))
-    return replace(found, notes=(*compiled.trailer.get("notes", ()), *found.notes))
+    return replace(found, notes=(*compiled.trailer.get("notes", ()), *found.notes), begin=begin)
 
 
 def planned(

@@ -75,6 +75,11 @@ def program_report(result: Result, prepared: Prepared) -> Report:
 def findings(about: dict[str, Any]) -> list[str]:
     """What a reader wants to know first, as sentences."""
     said, of = [], about.get("counted_in", "line")
+    if begin := about.get("begun_at_line"):
+        said.append(
+            f"It was begun at line {begin}: of the lines before, tool, spindle and coolant alone hold. The way there "
+            "counts as the first line that moves."
+        )
     if about["contour_error"]:
         worst = about["contour_error"]
         said.append(
@@ -112,7 +117,10 @@ def findings(about: dict[str, Any]) -> list[str]:
     elif "interpolator" in about:
         said.append(f"It moved for {moving:.3f} s; at the programmed feed throughout it is {predicted:.3f} s.")
     else:
-        said.append(f"It moved for {moving:.3f} s instead of {predicted:.3f} s: the override was not 100 % throughout.")
+        kept = ", which threads and taps do not follow" if about.get("own_feed") else ""
+        said.append(
+            f"It moved for {moving:.3f} s instead of {predicted:.3f} s: the override was not 100 % throughout{kept}."
+        )
     return said
 
 

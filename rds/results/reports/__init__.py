@@ -8,11 +8,14 @@ and `report(files, settings) -> Report` (content.py).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from rds.core.errors import InputError
 from rds.core.registry import Registry
+from rds.results.csv_file import description_beside
 from rds.results.reports.content import Report, Table
 from rds.results.reports.oacs import data_file
 from rds.results.reports.settings import Setting, read_settings, settings_rows
@@ -50,8 +53,23 @@ def make_report(kind: str, files: Sequence[str | Path], options: Mapping[str, st
     if not files:
         raise InputError(f"a report on {kind} needs data; name at least one file")
     settings = read_settings(options or {}, module.SETTINGS, f"report {kind}")
-    made: Report = module.report([data_file(file) for file in files], settings)
-    return made
+    found = [data_file(file) for file in files]
+    made: Report = module.report(found, settings)
+    return replace(made, findings=[*_doubts(found), *made.findings])
+
+
+def _doubts(files: Sequence[Path]) -> Iterator[str]:
+    """What runs among the files say against their own readings: a report of them says the same first."""
+    for file in files:
+        with suppress(InputError, OSError):  # a table that nothing describes
+            meta = description_beside(file)["meta"]
+            if meta.get("verdict") in ("missed", "void"):
+                said = (
+                    f"its timing is {meta['verdict']}: samples were late or left out, and the numbers hold their effect"
+                )
+                yield f"{file.name}: {said}; run it again on a computer that is free"
+            if meta.get("ending") not in (None, "done"):
+                yield f"{file.name}: the run ended early ({meta['ending']})"
 
 
 def options_of(kind: str) -> dict[str, Setting]:
