@@ -30,15 +30,14 @@ from rds.nc.run.judge import WAITS
 DOCUMENT = "docs/part-programs.md"
 TEXT = (Path(__file__).parents[2] / DOCUMENT).read_text(encoding="utf-8").partition("## Running")[2]
 COMMANDS = [
-    shlex.split(line, comments=True)[1:]
+    shlex.split(line)[1:]
     for block in blocks(DOCUMENT)
-    if block.language == "sh"
+    if block.language == "sh" and "circular" not in block.text  # which draws a picture of the document (pictures.py)
     for line in block.text.splitlines()
 ]
-CIRCLES = [command for command in COMMANDS if any("circular" in word for word in command)]  # one after the other
 
 
-@pytest.mark.parametrize("command", [each for each in COMMANDS if each not in CIRCLES], ids=" ".join)
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_the_commands_of_the_document_work(command: list[str], part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(part.parent)
     (part.parent / "tools.tbl").write_text("T1 P1 Z12.0 D3.0\n")
@@ -59,17 +58,6 @@ def test_the_commands_of_the_document_work(command: list[str], part: Path, monke
     assert found["program"]["completed"]
     assert set(found["program"]) - {"file"} <= set(re.findall(r"`(\w+)`", TEXT))
     assert found["files"]["program"] == str(folder / "program.html")
-
-
-def test_the_circular_test_of_the_document_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    bundled, run, other_run, report = CIRCLES
-    assert run[:3] == other_run[:3]  # one of the two is enough
-    for command in (bundled, other_run, [word for word in report if word != "tracking"]):
-        done = CliRunner().invoke(app, command)
-        assert done.exit_code == 0, done.output
-    assert "pid: " in done.stdout
-    assert {"circular.html", "circular-circle-pid.png"} <= {path.name for path in Path("circles").iterdir()}
 
 
 def test_every_column_state_and_live_value_is_named() -> None:
