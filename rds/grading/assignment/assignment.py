@@ -82,6 +82,8 @@ def read_assignment(path: str | Path) -> Assignment:
     file = file / FILE if file.is_dir() else file
     if not file.is_file():
         raise InputError(f"there is no {FILE}; name the assignment's folder", str(path))
+    if file.suffix != ".toml":
+        raise InputError(f"it is no assignment; name the folder with {FILE} first, then what is handed in", str(path))
     words, folder = TomlTable.open(file, ASSIGNMENT), file.parent
     kind = words.read("kind")
     machine = words.read("machine")
