@@ -89,7 +89,7 @@ ATTACKS = {
         "import sys\ndef profile(*a): raise KeyboardInterrupt\nsys.setprofile(profile)", LOAD, "KeyboardInterrupt"
     ),
     "an audit hook that raises": Attack(
-        "import sys\ndef hook(*a): raise SystemExit\nsys.addaudithook(hook)", KILLED, "exit code 1"
+        "import sys\ndef hook(*a): raise SystemExit\nsys.addaudithook(hook)", LOAD, "SystemExit"
     ),
     "a garbage collector that raises": Attack(
         "import gc, sys\nsys.unraisablehook = lambda *a: None\ngc.set_threshold(1)\ngc.callbacks.append(lambda *a: 1 / 0)"

@@ -45,8 +45,8 @@ ATTACKS = {
     ),
     "a syntax error that is none": Attack(
         "import os, sys, time\ninitial_state = 0\ndef control(t, r, y, state, params):\n    if state == 5:\n        e = SyntaxError('x')\n        e.filename, e.lineno, e.offset, e.text = 5, 'no', object(), 7\n        raise e\n    return 1.0, state + 1\n",
-        KILLED,
-        "exit code 1",
+        CONTRACT,
+        "SyntaxError: x",
     ),
     "exceptions in exceptions": Attack(
         "import os, sys, time\ninitial_state = 0\ndef control(t, r, y, state, params):\n    if state == 5:\n        e = ValueError('x')\n        for _ in range(5000): e = ExceptionGroup('g', [e])\n        raise e\n    return 1.0, state + 1\n",

@@ -37,7 +37,7 @@ SAVE, LOAD = 0x65766173, 0x64616F6C  # "save" and "load": what 0x1010 and 0x1011
 _ON_COMMAND = 1  # 0x1010 and 0x1011: it does so on command
 _CLOSE = 0.75  # periods: of any two hosts with one period, one comes closer than that after the other
 _NONE_LOST = 1.5  # periods between two SYNCs: in less, none can have been lost
-_LATE = 10  # SYNCs after one without a command in which that command may still come
+_LATE = 3  # SYNCs after one without a command in which that command may still come
 _MOVING = 2e-3  # s between two looks at an axis under power if no frame comes
 
 
