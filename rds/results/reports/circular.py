@@ -127,13 +127,13 @@ class CircularTest:
         feed = None if self.feed is None else 60 * self.feed
         return [way, min(arc.steady for arc in arcs), self.radius, feed, off[0], *offset, 1e3 * float(G), *off[1:]]
 
-    def _diagnose(self, reach: float) -> None:
+    def _fit(self) -> tuple[np.ndarray, list[float], np.ndarray]:
+        """The terms, each axis's play in µm, and what they leave in each cell of each arc; `level` and `left`."""
         angle = (np.arange(_CELLS) + 0.5) * 2 * pi / _CELLS
         off = np.concatenate([_in_cells(*_polar(arc, self.centre), self.radius) for arc in self.arcs])
         s, a = np.repeat([arc.sense for arc in self.arcs], _CELLS), np.tile(angle, len(self.arcs))
-        both = len(self.arcs) > 1
         terms = [np.where(s == arc.sense, f, 0.0) for arc in self.arcs for f in (np.ones(len(a)), np.cos(a), np.sin(a))]
-        terms += [np.cos(2 * a), np.sin(2 * a), s * np.sin(2 * a)][: 3 if both else 2]
+        terms += [np.cos(2 * a), np.sin(2 * a), s * np.sin(2 * a)][: 3 if len(self.arcs) > 1 else 2]
         travel = s * a, s * a - s * pi / 2  # since a reversal of either axis, at its largest position
         there = np.isfinite(off)
         play, weight = [0.0, 0.0], np.ones(int(there.sum()))
@@ -149,7 +149,12 @@ class CircularTest:
         rest[there] = left
         self.level = max(self.level, usual)
         self.left = 2 * float(np.quantile(np.abs(left), 0.9))  # µm, beside G: but for spikes
-        self.spikes = self._spikes(rest.reshape(-1, _CELLS), int(reach * _CELLS / 360), play)
+        return found, play, rest.reshape(-1, _CELLS)
+
+    def _diagnose(self, reach: float) -> None:
+        found, play, rest = self._fit()
+        self.spikes = self._spikes(rest, int(reach * _CELLS / 360), play)
+        both = len(self.arcs) > 1
         S, Q, M = (float(value) for value in found[3 * len(self.arcs) :][:3])
         (one, other), R, v = self.axes, self.radius, self.feed
         at_45 = "an ellipse at 45°, the same in both directions; positive: less than 90° between the axes"
