@@ -179,7 +179,7 @@ def test_what_is_no_circle_is_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=said):
             report_of(tmp_path, table)
-    with pytest.raises(InputError, match="two linear axes in mm, and there are X, Y"):
+    with pytest.raises(InputError, match="axes=X,Z: the linear axes in mm are X, Y; name two"):
         report_of(tmp_path, both_ways(), axes="X,Z")
     with pytest.raises(InputError, match="leave the option radius away"):
         report_of(tmp_path, both_ways(), both_ways(), radius=20)

@@ -63,10 +63,13 @@ def find_arcs(file: Path, axes: str | None) -> list[Arc]:
     measured = {name.removesuffix("_measured"): each for name, each in columns.items() if name.endswith("_measured")}
     measured = measured or {name.upper(): each for name, each in columns.items() if len(name) == 1 and name != "t"}
     names = axes.upper().replace(" ", "").split(",") if axes else list(measured)
-    if len(names) < 2 or not set(names) <= set(measured):
+    there = ", ".join(measured) or "none"
+    if axes and not set(names) <= set(measured):
+        raise InputError(f"axes={axes}: the linear axes in mm are {there}; name two of them", str(file))
+    if len(names) < 2:
         raise InputError(
-            f"a circle needs two linear axes in mm, and there are {', '.join(measured) or 'none'}; give columns "
-            "x_mm and y_mm, or X_measured [mm] and Y_measured [mm], and axes=X,Y where there are others",
+            f"a circle needs two linear axes in mm, and there are {there}; give columns x_mm and y_mm, or X_measured "
+            "[mm] and Y_measured [mm], and convert those in another unit",
             str(file),
         )
     found, said = list[Arc](), ""
