@@ -76,7 +76,7 @@ ONLY = {
         *(f"rds.bus.modules.dcs.{name}" for name in ("buffers", "build", "commands", "host", "methods", "port")),
         *("rds.bus.modules.segments", "rds.bus.modules.server_process", "rds.bus.hub.bus_settings"),
         "rds.bus.hub.command",  # no other run moves the axes meanwhile
-        *("rds.bus.modules.dcs", "rds.bus.modules.course", "rds.bus.modules.drift", "rds.bus.tools.link"),
+        *("rds.bus.modules.dcs", "rds.bus.modules.motion_course", "rds.bus.modules.drift", "rds.bus.tools.link"),
         *(
             f"rds.bus.modules.rds.{name}"
             for name in ("frames", "module", "motion_frames", "motion_host", "motion_port")

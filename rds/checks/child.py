@@ -32,7 +32,7 @@ class Output:
 
 
 @dataclass
-class Ended:
+class ChildEnd:
     """How a child came to its end; `code` is negative for a signal, None if it was stopped for its time."""
 
     code: int | None
@@ -45,7 +45,7 @@ def run_child(
     time_limit: float,
     environment: Mapping[str, str],
     pulse: Callable[[], None] = lambda: None,
-) -> Ended:
+) -> ChildEnd:
     """Run `command` for `time_limit` s at most, with nothing on its stdin, and everything that it started.
 
     `pulse()` is called ten times a second meanwhile; what it raises ends the child.
@@ -59,7 +59,7 @@ def run_child(
         env=dict(environment),
         start_new_session=posix,  # so that its children can be ended with it
     )
-    ended = Ended(None)
+    ended = ChildEnd(None)
     assert process.stdout is not None and process.stderr is not None
     streams = ((process.stdout, ended.out), (process.stderr, ended.err))
     drains = [threading.Thread(target=_drain, args=pair, daemon=True) for pair in streams]

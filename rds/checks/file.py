@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.checks import clauses
-from rds.checks.child import Ended, run_child
+from rds.checks.child import ChildEnd, run_child
 from rds.checks.report import CheckReport, Fault, FileReport, read_faults, read_report
 from rds.core.errors import ContractError, InputError
 from rds.core.shared_quantities import SAMPLE_PERIOD
@@ -79,7 +79,7 @@ def check_file(
         return _report(file, _events(result), ended, _place(trace, file))
 
 
-def _report(file: Path, events: list[dict[str, Any]], ended: Ended, place: str) -> FileReport:
+def _report(file: Path, events: list[dict[str, Any]], ended: ChildEnd, place: str) -> FileReport:
     reports: list[CheckReport] = []
     warnings: list[Fault] = []
     current, complete = "file", False
@@ -106,7 +106,7 @@ def _report(file: Path, events: list[dict[str, Any]], ended: Ended, place: str) 
     return FileReport(str(file), tuple(reports), tuple(warnings))
 
 
-def _ending(interface: str, ended: Ended, place: str) -> Fault:
+def _ending(interface: str, ended: ChildEnd, place: str) -> Fault:
     what = _FUNCTION[interface]
     if ended.code is None or (place and ended.code == 1):  # 1: the worker's own time limit
         said = f"{what} does not return{place and ': it was still at ' + place}"

@@ -11,8 +11,8 @@ import numpy as np
 
 from rds.checks import clauses
 from rds.checks.checked_code import CheckedCode, checked_code
+from rds.checks.hidden_state import changed, outside_sources, remembered
 from rds.checks.paths import ARC, CIRCLE, CLOCKWISE, LINE, LINE_BACK, LINE_OF_ONE, LINE_OF_THREE, name_of
-from rds.checks.places import changed, outside_sources, remembered
 from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.rows import Trace, alternate, trace
 from rds.checks.timing import Work, judge_time

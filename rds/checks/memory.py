@@ -10,7 +10,7 @@ from typing import Any
 
 from rds.checks import clauses
 from rds.checks.checked_code import CheckedCode
-from rds.checks.places import changed, outside_sources, remembered
+from rds.checks.hidden_state import changed, outside_sources, remembered
 from rds.checks.replay import Call, Difference, Replay
 from rds.checks.report import Findings
 from rds.checks.values import is_plain

@@ -93,7 +93,7 @@ def through_exchanges(
     """The result of each run; what happens goes to stderr, and to the file of events."""
     from rds.bus.modules.oacs.events import EventFile
     from rds.core.errors import InputError
-    from rds.modes.experiment.exchange import Hands, run_through_exchanges
+    from rds.modes.experiment.exchange import ExchangeCalls, run_through_exchanges
 
     if json and not yes:
         raise InputError("--json cannot ask; add --yes, which accepts what the run can go on with")
@@ -118,7 +118,7 @@ def through_exchanges(
 
     try:
         return run_through_exchanges(
-            experiment, file, Hands(accept, lambda offer, why: say(why), tell), mode, out, go, changes
+            experiment, file, ExchangeCalls(accept, lambda offer, why: say(why), tell), mode, out, go, changes
         )
     finally:
         if kept is not None:

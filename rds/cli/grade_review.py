@@ -53,7 +53,7 @@ def review(
         from rds.core.errors import InputError
         from rds.grading.batch.finished import read_finished
         from rds.grading.review.entries import Entry, Kind
-        from rds.grading.review.say import marks_table, read_marks, say
+        from rds.grading.review.new_entries import marks_table, read_marks, say
 
         ways = {"--points": points, "--excuse": excuse or None, "--extend-days": extend_days, "--undo": undo}
         chosen = [way for way, given in (ways | {"--marks": marks}).items() if given is not None]
@@ -219,14 +219,14 @@ def _as_json(finished: Finished, entries: list[Entry]) -> dict[str, object]:
 
 def _show_log(finished: Finished) -> None:
     from rds.cli.console import show_table
-    from rds.grading.review.listed import LOG, log
+    from rds.grading.review.tables import LOG, log
 
     show_table("Review", LOG, log(finished))
 
 
 def _show_waiting(finished: Finished) -> None:
     from rds.cli.console import show_table
-    from rds.grading.review.listed import WAITING, waiting
+    from rds.grading.review.tables import WAITING, waiting
 
     if rows := waiting(finished):
         show_table("To look at", WAITING, rows)

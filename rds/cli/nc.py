@@ -21,7 +21,7 @@ from rds.core.shared_quantities import SAMPLE_PERIOD
 
 if TYPE_CHECKING:
     from rds.core.progress import Progress
-    from rds.interpolators.motion.limiting import Explained
+    from rds.interpolators.motion.limiting import LimitingCauses
     from rds.machines import Machine
     from rds.nc.compensation.proof import Proof
     from rds.nc.cycle_time import CycleTime
@@ -252,7 +252,7 @@ def time(
 
 def _why(
     file: Path, of: Machine, what: Setup, found: CycleTime, profile: str, bar: Callable[[str], Progress]
-) -> tuple[Explained, Path]:
+) -> tuple[LimitingCauses, Path]:
     """What holds the planned motion back, and the picture of its certificate."""
     from rds.core.errors import InputError
     from rds.interpolators.motion.limiting import explained

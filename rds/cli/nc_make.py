@@ -17,7 +17,7 @@ from rds.cli.option_groups import take
 from rds.cli.option_names import named_by_options
 from rds.core.quantities import Flag, Quantity
 from rds.nc.paths.numbers import BLEND, DECIMALS, HEIGHT, SPINDLE
-from rds.nc.paths.objects import DEPTH, FEED, OBJECTS, File, Made, numbers
+from rds.nc.paths.objects import DEPTH, FEED, OBJECTS, File, MadePath, numbers
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -63,7 +63,7 @@ def written(
     plot: Annotated[Path | None, typer.Option(help="Also save a picture of the path (PNG).")] = None,
     json: Json = False,
     *,
-    make: Callable[[], Made],
+    make: Callable[[], MadePath],
     options: Collection[str] = (),
 ) -> None:
     """Write what `make` makes as a part program, perhaps with a picture (both or none), and tell of it."""
@@ -103,7 +103,7 @@ _SHARED = {name: p for name, p in inspect.signature(written).parameters.items() 
 _SHARED_HINTS = get_type_hints(written, include_extras=True)
 
 
-def maker(make: Callable[..., Made]) -> Callable[..., None]:
+def maker(make: Callable[..., MadePath]) -> Callable[..., None]:
     """A command of `make`'s own options and those of `written`."""
     own = inspect.signature(make).parameters
     declared_hints = get_type_hints(make, include_extras=True)
@@ -158,7 +158,7 @@ def outline(
             "one pixel wide are left out, and parts that touch at a corner joined.",
         ),
     ] = False,
-) -> Made:
+) -> MadePath:
     """The outline of the shape in a drawing, counter-clockwise and closed."""
     from rds.nc.paths.drawing import read_drawing
     from rds.nc.paths.outlines import outline as make
@@ -174,7 +174,7 @@ def outline(
     said = f"outline of {file.name}, {columns} x {rows} pixels of {pixel:g} mm"
     more = {"deviation_mm": traced.deviation, "tolerance_mm": tolerance, "outlines": len(traced.rings)}
     more["specks_left_out"] = traced.specks
-    return Made(traced.segments, said, more, traced, file)
+    return MadePath(traced.segments, said, more, traced, file)
 
 
 def _level(text: str | None, photo: bool) -> float | None:

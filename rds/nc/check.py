@@ -17,7 +17,7 @@ from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_co
 from rds.nc.configuration import configured
 from rds.nc.language.canon import Call, MotionBlock
 from rds.nc.language.errors import ProgramError
-from rds.nc.language.reading_on import Later, faults_never_run
+from rds.nc.language.rest_of_file import RestOfFile, faults_never_run
 from rds.nc.lathe_words import meant_otherwise
 from rds.nc.passed_over import Report
 from rds.nc.path_block import PathBlock
@@ -122,7 +122,7 @@ def check_program(
         for _ in blocks:  # the rest is looked at all the same
             pass
         if validator.stopped is not None:
-            later = Later(validator.stopped, setup.options)
+            later = RestOfFile(validator.stopped, setup.options)
             for fault in later.faults():
                 validator.report(fault, f"{fault.column}: {fault.reason}")
             validator.read_on = later.some

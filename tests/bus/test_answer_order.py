@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.bus.modules.rds import frames
-from rds.bus.modules.rds.answer_order import DUPLICATES, PERSISTENT, SUSPECTED, AnswerOrder, Place
+from rds.bus.modules.rds.answer_order import DUPLICATES, PERSISTENT, SUSPECTED, AnswerOrder, AnswerPosition
 from rds.bus.modules.rds.drivers import AxisDrivers
 from rds.bus.modules.rds.frames import COUNT_TURNS, Answer, Kind, Status
 from rds.core.errors import MachineError
@@ -146,7 +146,7 @@ def in_step(at: int, ticks: int = 0) -> AnswerOrder:
     """The answer to tick `at` was taken, and so many more are sent."""
     order = AnswerOrder()
     order.tick()
-    assert order.place(answer(at)) == Place.LAST and order.take(answer(at)) == 0, "the first may say any count"
+    assert order.place(answer(at)) == AnswerPosition.LAST and order.take(answer(at)) == 0, "the first may say any count"
     for _ in range(ticks):
         order.tick()
     return order
@@ -157,8 +157,8 @@ def in_step(at: int, ticks: int = 0) -> AnswerOrder:
 def test_what_follows_is_new_and_at_most_some_duplicates_ahead(at: int, ticks: int) -> None:
     most = ticks + DUPLICATES
     for further, place in ((0, "ASTRAY"), (1, "LAST"), (ticks, "LAST"), (most, "LAST"), (most + 1, "ASTRAY")):
-        assert in_step(at, ticks).place(answer(at + further)) == Place[place]
-    assert in_step(at).place(answer(at)) == Place.ASTRAY, "it comes twice, and no tick was sent meanwhile"
+        assert in_step(at, ticks).place(answer(at + further)) == AnswerPosition[place]
+    assert in_step(at).place(answer(at)) == AnswerPosition.ASTRAY, "it comes twice, and no tick was sent meanwhile"
 
 
 @pytest.mark.parametrize("ticks", [1, 2])
@@ -167,7 +167,7 @@ def test_one_that_follows_the_last_taken_shows_that_the_module_is_there(ticks: i
     order = in_step(1000, ticks)
     for k in range(PERSISTENT - 1):
         order.place(answer(30_000 + k))
-    assert order.place(answer(1001)) == Place.LAST
+    assert order.place(answer(1001)) == AnswerPosition.LAST
     for k in range(SUSPECTED):
         assert not order.is_another(silent=True)
         order.place(answer(30_000 + PERSISTENT - 1 + k))
@@ -179,10 +179,10 @@ def test_answers_astray_that_follow_one_another_are_another_modules(step: int, i
     order = in_step(1000, 1)
     for k in range(1, PERSISTENT + 1):
         for _ in range(2):  # one that comes twice says nothing
-            assert order.place(answer(30_000 + k * step)) == Place.ASTRAY
+            assert order.place(answer(30_000 + k * step)) == AnswerPosition.ASTRAY
         assert order.is_another() == (is_one and k >= PERSISTENT)
         assert order.is_another(silent=True) == (is_one and k >= SUSPECTED)
-    assert order.place(answer(1001)) == Place.LAST and not order.is_another(silent=True), "it is still there"
+    assert order.place(answer(1001)) == AnswerPosition.LAST and not order.is_another(silent=True), "it is still there"
     for k in range(2):
         order.place(answer(30_000 + k))
     assert not order.is_another(silent=True), "they are counted anew"
@@ -196,20 +196,20 @@ def test_a_doubtful_answer_is_of_a_slow_module_or_of_one_that_lost_a_tick() -> N
 
     def doubtful() -> AnswerOrder:
         order = in_step(1000, 2)
-        assert order.place(answer(1001)) == Place.LAST
+        assert order.place(answer(1001)) == AnswerPosition.LAST
         order.take_doubtful(answer(1001))
         assert (order.expected, order.behind, order.owed) == (1001, 1, 1)
         return order
 
     lost = doubtful()
     lost.tick()
-    assert lost.place(answer(1002)) == Place.LAST and lost.take(answer(1002)) == 1
+    assert lost.place(answer(1002)) == AnswerPosition.LAST and lost.take(answer(1002)) == 1
     slow = doubtful()
     slow.tick()
     slow.tick()  # 1003 in its count, 1004 in the host's
-    assert slow.place(answer(1002)) == Place.EARLIER and slow.owed == 0
-    assert slow.place(answer(1003)) == Place.LAST
-    assert slow.place(answer(1004)) == Place.LAST and slow.take(answer(1004)) == 0
+    assert slow.place(answer(1002)) == AnswerPosition.EARLIER and slow.owed == 0
+    assert slow.place(answer(1003)) == AnswerPosition.LAST
+    assert slow.place(answer(1004)) == AnswerPosition.LAST and slow.take(answer(1004)) == 0
     for ticks, owed, gives, expected, behind in ((1001, 0, 0, 1001, 1), (1002, 0, 0, 1002, 0), (1003, 0, -1, 1003, 0)):
         between = doubtful()  # two periods
         assert between.straggler(answer(ticks)) == gives

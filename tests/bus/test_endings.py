@@ -18,7 +18,7 @@ import pytest
 from waiting import wait_for
 
 from rds.bus.hub import connect, wire
-from rds.bus.hub.error_states import SEATS, Board
+from rds.bus.hub.error_states import SEATS, ErrorStateFile
 from rds.bus.hub.hub_loop import STALL
 
 from .conftest import FORK
@@ -181,12 +181,12 @@ def test_a_board_for_which_there_is_no_room_is_refused(
 ) -> None:
     """A hub that wrote where a full disk had no page was killed."""
     path = runtime_directory / "board"
-    board = Board(path)
+    board = ErrorStateFile(path)
     assert path.stat().st_blocks * 512 >= SEATS
     board.remove()
     with monkeypatch.context() as patched, pytest.raises(OSError, match="No space left"):
         patched.setattr(os, "write", lambda descriptor, data: 512)
-        Board(path)
+        ErrorStateFile(path)
     assert not path.exists()
     (runtime_directory / "rds").mkdir(mode=0o700, exist_ok=True)
     (runtime_directory / "rds" / "test.states").mkdir()

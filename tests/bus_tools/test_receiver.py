@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from waiting import wait_for
 
 from rds.bus.tools import receiver as module
-from rds.bus.tools.receiver import Fault, Receiver, Trouble
+from rds.bus.tools.receiver import Fault, ReceiveFault, Receiver
 
 RAISES: list[Callable[[], BaseException]] = [
     lambda: can.CanOperationError("bus error"),
@@ -98,7 +98,9 @@ def test_it_goes_on_or_says_so(make: Callable[[], BaseException], caplog: pytest
         else:
             assert frames.get(10.0) is None
             wait_for(lambda: not receiver.alive())
-    assert [fault.trouble for fault in faults] == [Trouble.BUS if isinstance(error, Exception) else Trouble.ENDED]
+    assert [fault.trouble for fault in faults] == [
+        ReceiveFault.BUS if isinstance(error, Exception) else ReceiveFault.ENDED
+    ]
     assert (str(error) or type(error).__name__) in faults[0].text
     assert [record.getMessage() for record in caplog.records if record.levelno >= logging.ERROR] == [faults[0].text]
     assert first.shut_down
@@ -113,13 +115,13 @@ def test_every_frame_arrives_or_the_end_was_reported(script: list[Any]) -> None:
     frames = receiver.subscribe()
     with receiver:
         wait_for(lambda: not bus.script or not receiver.alive())
-        going_on = receiver.alive() and not any(fault.trouble is Trouble.ENDED for fault in faults)
+        going_on = receiver.alive() and not any(fault.trouble is ReceiveFault.ENDED for fault in faults)
     seen = []
     while (message := frames.get(0.0)) is not None:
         seen.append(message)
     fatal = next((i for i, x in enumerate(script) if callable(x) and not isinstance(x(), Exception)), len(script))
     assert seen == [item for item in script[:fatal] if isinstance(item, can.Message)]
-    assert going_on or [fault.trouble for fault in faults][-1] is Trouble.ENDED
+    assert going_on or [fault.trouble for fault in faults][-1] is ReceiveFault.ENDED
 
 
 def test_an_outage_is_reported_once_and_its_end_too() -> None:
@@ -159,7 +161,7 @@ def test_bus_off_is_reported_and_the_bus_opened_again() -> None:
         frames = receiver.subscribe()
         receiver.start()
         assert number(frames.get(10.0)) == 1
-    assert [fault.trouble for fault in faults] == [Trouble.BUS_OFF]
+    assert [fault.trouble for fault in faults] == [ReceiveFault.BUS_OFF]
 
 
 def test_without_reopening_the_first_failure_is_the_end() -> None:
@@ -183,7 +185,7 @@ def test_a_subscriber_that_fails_is_reported_and_the_others_go_on(make: Callable
         assert [number(frames.get(10.0)) for _ in range(3)] == [0, 1, 2]
         wait_for(lambda: faults)
         assert receiver.alive()
-    assert [fault.trouble for fault in faults] == [Trouble.SUBSCRIBER] and "plotter failed" in faults[0].text
+    assert [fault.trouble for fault in faults] == [ReceiveFault.SUBSCRIBER] and "plotter failed" in faults[0].text
 
 
 def test_an_error_callback_that_fails_does_no_harm(caplog: pytest.LogCaptureFixture) -> None:
@@ -207,7 +209,7 @@ def test_a_slow_subscriber_loses_frames_visibly_and_holds_nobody_up() -> None:
         assert [number(quick.get(10.0)) for _ in range(100)] == list(range(100))
         assert slow.lost == 90
         assert [number(slow.get(10.0)) for _ in range(10)] == list(range(10))
-    assert [fault.trouble for fault in faults] == [Trouble.OVERFLOW]
+    assert [fault.trouble for fault in faults] == [ReceiveFault.OVERFLOW]
     assert "slow one is 10 frames behind test bus" in faults[0].text
 
 
@@ -236,5 +238,5 @@ def test_a_killed_hub_is_reported_and_a_new_one_found(hub: Callable[..., Any], o
             sender.send(numbered(2))
             assert number(frames.get(10.0)) == 2
         assert receiver.alive()
-    assert [fault.trouble for fault in faults] == [Trouble.BUS]
+    assert [fault.trouble for fault in faults] == [ReceiveFault.BUS]
     assert "ended without a word" in faults[0].text

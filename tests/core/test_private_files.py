@@ -130,7 +130,7 @@ ELSEWHERE = {
     "bus/hub/hub.py": "0600, in the runtime folder",
     "bus/modules/dcs/port.py": "0600, in the runtime folder",
     "bus/modules/dcs/server.py": "0600, in the runtime folder",
-    "panels/app/whereabouts.py": "0600, in a folder of mkdtemp",
+    "panels/app/kernel_stack.py": "0600, in a folder of mkdtemp",
     "grading/exports/one_submission.py": "in a folder of mkdtemp",
     "grading/container/container.py": "what an image is made from, in a folder of mkdtemp",
     "grading/sandbox/user.py": "in a mount namespace of its own",

@@ -18,8 +18,8 @@ from rds.grading.assignment.trusted import TrustedFiles
 from rds.grading.cases.case import CaseRun
 from rds.grading.cases.control import ControlCase
 from rds.grading.sandbox import Pool
-from rds.grading.sandbox.counts import Counts
-from rds.grading.sandbox.subject import LoadedSubmission
+from rds.grading.sandbox.loaded_submission import LoadedSubmission
+from rds.grading.sandbox.work_counts import WorkCounts
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
 
 BLIND = HEAD.replace("title", 'self_check = "blind"\ntitle')
@@ -155,7 +155,7 @@ def test_work_is_counted_for_the_first_students_only(
     work = RMS.replace("rms-error", "work").replace("0.05", "50").replace("0.5", "500").replace("mm", "events")
     counts, count = [], LoadedSubmission.count
 
-    def counted(subject: LoadedSubmission) -> Counts:
+    def counted(subject: LoadedSubmission) -> WorkCounts:
         counts.append(count(subject))
         return counts[-1]
 

@@ -15,8 +15,8 @@ from rds.grading.course.class_list import ClassList, Member, read_class_list
 from rds.grading.course.groups import by_group, with_groups_of_export, without_groups_of_export
 from rds.grading.grade import Status
 from rds.grading.intake import HandedIn, Intake
+from rds.grading.review.class_grades import everyone
 from rds.grading.review.entries import Review
-from rds.grading.review.everyone import everyone
 from tests.grading.grades import grade
 
 TEXT = """student,name,email,section,group,extension_days,late_days

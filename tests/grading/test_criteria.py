@@ -9,7 +9,7 @@ import pytest
 
 from rds.grading.criteria import KINDS
 from rds.grading.criteria.measuring import NotMeasured
-from rds.grading.sandbox.counts import Counts
+from rds.grading.sandbox.work_counts import WorkCounts
 from tests.grading.made import T, run_of
 
 N = 2000
@@ -157,10 +157,10 @@ def test_fit_is_that_of_validation() -> None:
 
 
 def test_work_is_events_per_sample_or_why_there_are_none() -> None:
-    assert measured("work", errors(np.ones(10), counts=Counts(10, 190))) == 19.0
-    assert measured("work", errors(np.ones(10), counts=Counts(1, 190), rows=np.zeros((19, 3, 1)))) == 10.0
+    assert measured("work", errors(np.ones(10), counts=WorkCounts(10, 190))) == 19.0
+    assert measured("work", errors(np.ones(10), counts=WorkCounts(1, 190), rows=np.zeros((19, 3, 1)))) == 10.0
     with pytest.raises(NotMeasured, match="tampered"):
-        measured("work", errors(np.ones(10), counts=Counts(10, refused="it has tampered with the counter")))
+        measured("work", errors(np.ones(10), counts=WorkCounts(10, refused="it has tampered with the counter")))
 
 
 def test_every_criterion_says_what_it_measures() -> None:

@@ -9,10 +9,10 @@ import pytest
 
 from rds.grading.assignment.assignment import read_assignment
 from rds.grading.assignment.trusted import TrustedFiles
-from rds.grading.batch.grade_one import Opened
+from rds.grading.batch.grade_one import OpenSubmission
+from rds.grading.criteria.applied_force import force, free_stretch
 from rds.grading.criteria.law_fit import law_fits
 from rds.grading.criteria.linear import LinearLoop, NoLoop, linear_loop
-from rds.grading.criteria.pushed import force, free_stretch
 from rds.models import library_model
 from tests.grading.made import HEAD, assignment_in
 
@@ -176,7 +176,7 @@ def loop_of(folder: Path, law: str, seed: int = 1, plant: str = "", moving: bool
     if moving:
         text = text.replace("duration = 0.8", "duration = 1.5").replace('kind = "constant"\nvalue = 0.5\n', SINE)
     assignment = read_assignment(assignment_in(folder, text, law))
-    opened = Opened(folder / "solution.py", assignment, TrustedFiles())
+    opened = OpenSubmission(folder / "solution.py", assignment, TrustedFiles())
     try:
         loop = assignment.cases[0].run(opened, seed, 0, ("linear",)).linear
     finally:

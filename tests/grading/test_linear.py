@@ -12,10 +12,10 @@ from rds.core.load import load_student
 from rds.core.types import Model
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.trusted import TrustedFiles
-from rds.grading.batch.grade_one import Opened
+from rds.grading.batch.grade_one import OpenSubmission
+from rds.grading.criteria.applied_force import begin_of, force, free_stretch
 from rds.grading.criteria.law_fit import LawFit
 from rds.grading.criteria.linear import LinearLoop, NoLoop, closed
-from rds.grading.criteria.pushed import begin_of, force, free_stretch
 from rds.identification.robustness.margins import linear_law, loop_margins
 from rds.models import library_model
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
@@ -49,7 +49,7 @@ def control(t, r, y, state, params):
 
 def found_in(folder: Path, law: str, plant: str = "") -> tuple[LinearLoop | NoLoop, Assignment]:
     assignment = read_assignment(assignment_in(folder, TEXT.replace("{plant}", plant), law))
-    opened = Opened(folder / "solution.py", assignment, TrustedFiles())
+    opened = OpenSubmission(folder / "solution.py", assignment, TrustedFiles())
     try:
         linear = assignment.cases[0].run(opened, 1, 0, ("linear",)).linear
     finally:

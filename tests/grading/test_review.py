@@ -22,10 +22,10 @@ from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Band, Grade, Status
 from rds.grading.review.applied import of_review, reviewed
 from rds.grading.review.best import best
+from rds.grading.review.class_grades import everyone
 from rds.grading.review.entries import FILE, Entry, Kind, Review, add, read_review
-from rds.grading.review.everyone import everyone
+from rds.grading.review.new_entries import marks_table, read_marks, say
 from rds.grading.review.regrade import _kept, changes_of
-from rds.grading.review.say import marks_table, read_marks, say
 from tests.grading.grades import batch_in, grade, score
 from tests.grading.made import RMS, SINE, assignment_in
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rds.core.types import LineSegment, Reference
-from rds.grading.sandbox import Counts, Limits, Pool
+from rds.grading.sandbox import Limits, Pool, WorkCounts
 
 Written = Callable[..., Path]
 WORK = """
@@ -23,7 +23,7 @@ def control(t, r, y, state, params):
 """
 
 
-def counts(pool: Pool, path: Path, samples: int = 50) -> Counts:
+def counts(pool: Pool, path: Path, samples: int = 50) -> WorkCounts:
     """Of a run of as many samples."""
     with pool.open(path) as subject:
         subject.begin_control(T=1e-3)
@@ -115,7 +115,7 @@ def test_who_answers_otherwise_while_it_is_counted_gets_no_count(pool: Pool, wri
     text = "import resource\ninitial_state = ()\ndef control(t, r, y, state, params):\n"
     text += "    return float(resource.getrlimit(resource.RLIMIT_NPROC)[0]), state\n"
     found = counts(pool, written(text, ""), samples=2)
-    assert found == Counts(2, None, "at t = 0.000 s it answered otherwise while it was counted")
+    assert found == WorkCounts(2, None, "at t = 0.000 s it answered otherwise while it was counted")
 
 
 FORGED = {
@@ -492,7 +492,7 @@ def is_open(number):
     except OSError: return False
     return True
 """
-    assert counts(pool, written(text, ""), samples=2) == Counts(
+    assert counts(pool, written(text, ""), samples=2) == WorkCounts(
         2, None, "while it was counted: it wrote into the grader's pipe"
     )
 

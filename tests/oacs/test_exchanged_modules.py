@@ -20,13 +20,13 @@ from typer.testing import CliRunner
 from waiting import wait_for
 
 import rds
-from rds.bus.modules.oacs.events import Happened
+from rds.bus.modules.oacs.events import ModuleEvent
 from rds.bus.modules.oacs.offers import Offer, Offers
 from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.modes.experiment import Experiment
-from rds.modes.experiment.exchange import Hands, run_through_exchanges
+from rds.modes.experiment.exchange import ExchangeCalls, run_through_exchanges
 from rds.modes.experiment.run import Run
 from rds.nc.run.run import PartProgram
 from rds.results import Result
@@ -142,7 +142,7 @@ def test_a_run_ends_is_offered_a_machine_and_goes_on_by_itself(serve: Serve, cha
             end(slide)
         return run.wait()
 
-    def tell(happened: Happened) -> None:
+    def tell(happened: ModuleEvent) -> None:
         events.append(happened.event)
 
     def refuse(offer: Offer, why: str) -> None:
@@ -150,7 +150,7 @@ def test_a_run_ends_is_offered_a_machine_and_goes_on_by_itself(serve: Serve, cha
         if len(refused) == 1:
             serve("X")
 
-    hands = Hands(lambda offer: True, refuse, tell)
+    hands = ExchangeCalls(lambda offer: True, refuse, tell)
     first, *others, last = run_through_exchanges(experiment, tmp_path / "own.toml", hands, out=tmp_path / "out", go=go)
     assert first.meta["ending"] == "machine lost" and first.meta["machine"] == "mrmt-oacs"
     assert "X" in first.meta["ending_reason"]
@@ -180,7 +180,7 @@ def test_an_exchange_is_refused_where_none_can_be(words: dict[str, Any], says: s
     file = tmp_path / words.pop("file", "own.toml")
     given = {"mode": "implementation", "reference": rds.sinusoid(1.0, 0.5), "controller": {"name": "pid"}}
     with pytest.raises(InputError, match=says):
-        run_through_exchanges(Experiment(machine="mrmt-oacs", **given | words), file, Hands(lambda offer: True))
+        run_through_exchanges(Experiment(machine="mrmt-oacs", **given | words), file, ExchangeCalls(lambda offer: True))
 
 
 @pytest.mark.realtime

@@ -16,7 +16,7 @@ from rds.bus.modules.oacs.link import acknowledgement
 from rds.bus.modules.oacs.messages import Decoded, Frame, decode, encode
 from rds.bus.modules.oacs.module import OacsModule
 from rds.bus.modules.oacs.module_data import read_modules
-from rds.bus.modules.oacs.several import Several, VirtualPort
+from rds.bus.modules.oacs.module_group import ModuleGroup, VirtualPort
 from rds.cli.main import app
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
@@ -156,7 +156,7 @@ class Bench:
             for slot, name in enumerate(("X", "Z", "drill"))
         }
         self.port = VirtualPort(list(self.modules.values()))
-        self.host = Several(self.port, {DATA[name].node: name for name in self.modules})
+        self.host = ModuleGroup(self.port, {DATA[name].node: name for name in self.modules})
 
 
 def test_axes_that_stand_off_the_start_are_told_before_anything_moves() -> None:
@@ -232,7 +232,7 @@ def test_a_tool_that_does_not_come_to_rest_is_named() -> None:
             return said
 
     node = DATA["drill"].node
-    host = Several(Deaf(list(bench.modules.values())), {DATA[name].node: name for name in bench.modules})
+    host = ModuleGroup(Deaf(list(bench.modules.values())), {DATA[name].node: name for name in bench.modules})
     host.turn(node, 300.0)
     with pytest.raises(MachineError, match=r"^drill was told to stop and did not say within 60 s that it is at rest"):
         host.turn(node, 0.0)
@@ -262,7 +262,7 @@ def test_a_stop_that_does_not_reach_one_module_is_told_to_the_others() -> None:
             super().send(frame)
 
     port = Broken(list(bench.modules.values()))
-    host = Several(port, {DATA[name].node: name for name in ("X", "drill")})
+    host = ModuleGroup(port, {DATA[name].node: name for name in ("X", "drill")})
     host.turn(DATA["drill"].node, 300.0)
     host.rest(1.0)
     port.broken = True
@@ -275,7 +275,7 @@ def test_a_stop_that_does_not_reach_one_module_is_told_to_the_others() -> None:
 
 def test_a_module_that_is_not_there_is_named_and_all_stop() -> None:
     bench = Bench()
-    host = Several(bench.port, {DATA["X"].node: "X", DATA["A"].node: "A"})
+    host = ModuleGroup(bench.port, {DATA["X"].node: "X", DATA["A"].node: "A"})
     with pytest.raises(MachineError, match=r"^A was told to move to 3 and did not answer within 0.5 s"):
         host.to({DATA["X"].node: 20.0, DATA["A"].node: 3.0}, 60.0)
     host.rest(1.0)
@@ -298,7 +298,7 @@ def test_a_module_that_is_lost_in_the_middle_is_named_within_seconds_and_the_oth
                         break
                 return said
 
-        host = Several(Unplugged(list(bench.modules.values())), {DATA[name].node: name for name in bench.modules})
+        host = ModuleGroup(Unplugged(list(bench.modules.values())), {DATA[name].node: name for name in bench.modules})
         with pytest.raises(MachineError, match=rf"^{lost} has fallen silent: it answered nothing for 2 s; see to"):
             host.to({DATA["X"].node: 100.0}, 200.0)
         assert 4.5 < host.port.now() < 6.0

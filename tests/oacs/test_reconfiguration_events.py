@@ -12,7 +12,7 @@ import can
 import pytest
 from typer.testing import CliRunner
 
-from rds.bus.modules.oacs.events import EventFile, Happened, Reconfigurations
+from rds.bus.modules.oacs.events import EventFile, ModuleEvent, Reconfigurations
 from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.results.reports import make_report
@@ -20,9 +20,9 @@ from rds.results.reports import make_report
 Serve = Callable[..., subprocess.Popen[str]]
 
 
-def follow(watching: Reconfigurations, word: str) -> list[Happened]:
+def follow(watching: Reconfigurations, word: str) -> list[ModuleEvent]:
     """What happens until that."""
-    found: list[Happened] = []
+    found: list[ModuleEvent] = []
     for _ in range(60):
         found += watching.look()
         if any(happened.event == word for happened in found):

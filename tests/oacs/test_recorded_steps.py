@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from rds.bus.modules.oacs import Module, messages
 from rds.bus.modules.oacs.codes import MessageToHost
+from rds.bus.modules.oacs.messaging import ReceivedMessage
 from rds.bus.modules.oacs.module_data import read_modules
 from rds.bus.modules.oacs.recording import PositionRecorder
-from rds.bus.modules.oacs.talk import Heard
 from rds.cli.modules import folder_for
 from rds.core.errors import InputError
 from rds.machines import load_machine
@@ -43,7 +43,7 @@ def recorded(positions: Sequence[int], by: float = 1.0, lost: Sequence[int] = ()
             Position=counts,
             Sequence=number % 256,
         )
-        recorder.take(Heard(messages.decode(frame.identifier, frame.data), number * PERIOD, 0.0))
+        recorder.take(ReceivedMessage(messages.decode(frame.identifier, frame.data), number * PERIOD, 0.0))
     return recorder
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from rds.core.errors import MachineError
-from rds.panels.app.whereabouts import ask, own_line
+from rds.panels.app.kernel_stack import ask, own_line
 from rds.panels.page.shell import Rescue, Shell
 from rds.panels.session import Session
 from tests.panels.conftest import App, begin_with, turn_to
@@ -122,7 +122,7 @@ def test_a_kernel_that_its_code_ends_is_said_and_begun_again(run_until: Callable
 
 def test_a_process_says_its_line_while_compiled_code_holds_it(tmp_path: Path) -> None:
     code = (
-        "import sys; from pathlib import Path; from rds.panels.app.whereabouts import answer_asks\n"
+        "import sys; from pathlib import Path; from rds.panels.app.kernel_stack import answer_asks\n"
         "answer_asks(Path(sys.argv[1])); sys.path.insert(0, sys.argv[1]); import own\n"
     )
     (tmp_path / "own.py").write_text("def held():\n    return print(flush=True) or sum(range(10**12))\n\n\nheld()\n")

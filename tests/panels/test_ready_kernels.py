@@ -38,7 +38,7 @@ ASK = (
 # what draws for a kernel is its fork, at the lowest priority; should that be killed, the next one is not
 DRAWN = """
 import os, sys
-from rds.panels.session.beside import made_beside
+from rds.panels.session.background_pictures import made_beside
 ABOUT = "(os.getpid(), os.getppid(), os.nice(0), 'rds.panels.program.panel' in sys.modules)"
 about = lambda: made_beside(eval, ABOUT, {"os": os, "sys": sys})
 first, again = about(), about()

@@ -19,7 +19,7 @@ from rds.core.errors import InputError, RdsError
 from rds.modes.process.record import PROCESSES
 from rds.panels.equipment.state import Equipment
 from rds.panels.session import Session
-from rds.panels.session.beside import made_beside
+from rds.panels.session.background_pictures import made_beside
 from rds.panels.session.kept_runs import State
 from rds.panels.session.live_values import LiveValues
 from rds.panels.session.save_as import save_as

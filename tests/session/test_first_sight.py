@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from rds.panels.page.alive import RATE, Alive, first_sight
+from rds.panels.page.first_visit import RATE, Alive, first_sight
 from rds.panels.session import Session
 
 

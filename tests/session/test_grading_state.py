@@ -14,7 +14,7 @@ from rds.core.errors import InputError
 from rds.grading.batch.run import run_batch
 from rds.grading.grade import Grade, Status
 from rds.grading.review.applied import of_review
-from rds.grading.review.listed import log, waiting
+from rds.grading.review.tables import log, waiting
 from rds.grading.sandbox import available
 from rds.panels.grading.state import GradingState, _said, progress, rows
 from rds.panels.session import Session

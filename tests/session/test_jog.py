@@ -20,7 +20,7 @@ from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.panels.jog.axes import jog_axes, jog_spindles
-from rds.panels.jog.orders import DEAD_MAN, Orders
+from rds.panels.jog.jog_commands import DEAD_MAN, JogCommands
 from rds.panels.jog.state import Jog, _listen
 from rds.panels.session import Session
 from rds.panels.session.expired_orders import LATE
@@ -186,7 +186,7 @@ def test_whoever_gave_orders_dies_and_the_loop_ends_with_it(alone: Path) -> None
 
 def test_a_hold_lasts_as_long_as_it_is_renewed_and_goals_follow_each_other() -> None:
     machine = load_machine("mini-cnc")
-    orders = Orders(jog_axes(machine), jog_spindles(machine))
+    orders = JogCommands(jog_axes(machine), jog_spindles(machine))
     orders.hear({"hold": "X", "direction": -1, "speed": 99.0}, 10.0)
     assert orders.wanted(10.0 + DEAD_MAN) == ("X", -75.0, 13.0)  # its own limit
     assert orders.wanted(10.01 + DEAD_MAN) is None
@@ -201,7 +201,7 @@ def test_a_hold_lasts_as_long_as_it_is_renewed_and_goals_follow_each_other() -> 
 def test_orders_that_come_late_move_nothing() -> None:
     """Whoever gave them may have gone: a loop that stood still carried them out when it went on."""
     machine = load_machine("mini-cnc")
-    orders = Orders(jog_axes(machine), jog_spindles(machine))
+    orders = JogCommands(jog_axes(machine), jog_spindles(machine))
     late = 10.0 - LATE - 4.0
     orders.hear({"goals": [["Z", 5.0]], "speed": 2.0}, 9.0)
     orders.hear({"goals": [["X", 1.0]], "speed": 2.0, "at": late}, 10.0)

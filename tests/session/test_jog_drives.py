@@ -25,8 +25,8 @@ from rds.bus.modules.dialects import server_module
 from rds.cli.main import app
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
-from rds.panels.jog.hands import VoltageHand
-from rds.panels.jog.orders import SPINDLE_DEAD_MAN
+from rds.panels.jog.jog_commands import SPINDLE_DEAD_MAN
+from rds.panels.jog.module_control import VoltageHand
 from rds.panels.jog.state import Jog
 from rds.panels.session import Session
 

@@ -10,8 +10,8 @@ import pytest
 
 from rds.machines import load_machine
 from rds.panels.jog.axes import jog_axes
+from rds.panels.jog.jog_commands import JogCommands
 from rds.panels.jog.loop import jog
-from rds.panels.jog.orders import Orders
 
 
 class Drives:
@@ -23,7 +23,7 @@ class Drives:
         self.axes = {"X": jog_axes(load_machine("mini-cnc"))["X"]}
         self.spindles: dict[str, Any] = {}
         self.left_out: dict[str, str] = {}
-        self.orders = Orders(self.axes, {})
+        self.orders = JogCommands(self.axes, {})
         self.at = 0.0
 
     def start(self) -> None:

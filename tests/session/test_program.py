@@ -19,7 +19,7 @@ from rds.nc.active import Follower, modes_at
 from rds.nc.validation import Validation
 from rds.panels.interpolator.motion import MADE
 from rds.panels.kit.notice import Notice
-from rds.panels.program.check import Look
+from rds.panels.program.check import CheckState
 from rds.panels.program.mdi import FILE, Mdi
 from rds.panels.program.offsets import Offsets
 from rds.panels.program.path_view import PathView
@@ -38,7 +38,7 @@ def program(folder: Path, *lines: str) -> Program:
     return made
 
 
-def looked(made: Program) -> Look:
+def looked(made: Program) -> CheckState:
     deadline = time.monotonic() + PATIENCE
     while made.looking:
         made.tick()
@@ -168,7 +168,7 @@ def test_any_text_is_looked_at_without_an_error(tmp_path_factory: pytest.TempPat
 
     source = tmp_path_factory.getbasetemp() / "any.ngc"
     source.write_bytes(text.encode("utf-8", "replace"))
-    task: Task[Look] = Task("look", lambda task: look(task, source, "any.ngc", load_machine("mini-cnc"), Setup()))
+    task: Task[CheckState] = Task("look", lambda task: look(task, source, "any.ngc", load_machine("mini-cnc"), Setup()))
     task.start().wait(PATIENCE)
     assert task.error is None and task.result is not None
     assert task.result.ok or task.result.marks or task.result.trouble
@@ -198,7 +198,7 @@ def test_the_reach_has_the_units_and_the_tolerance_of_the_validator(tmp_path: Pa
     made = Program(Session(tmp_path, "xyzac"))
     most = {axis: made.machine.axes[axis].travel[1] for axis in "XA"}
     reach = Validation("", "xyzac", low={"X": 0.0, "A": 0.0}, high={"X": most["X"] + 1e-9, "A": most["A"] + 1e-3})
-    shown = _numbers(Look((), reach), made)
+    shown = _numbers(CheckState((), reach), made)
     assert re.findall(r"<tr><td>(.*?)</td>.*?<td>. (\w+)</td></tr>", shown) == [
         ("X [mm]", "inside"),
         ("A [deg]", "beyond"),

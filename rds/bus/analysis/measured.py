@@ -42,7 +42,7 @@ _FEW = 20  # frames
 _SET_BACK = 0.05  # s: by less, adapters deliver frames out of their order
 
 
-class During(NamedTuple):
+class BusOccupancy(NamedTuple):
     """Who had the bus while a frame was late, s."""
 
     scheduled: float = 0.0
@@ -69,7 +69,7 @@ class Delays(NamedTuple):
     pauses: int
     longer: int  # frames with more bytes than in the schedule
     values: np.ndarray  # of each frame
-    during: During  # of the largest
+    during: BusOccupancy  # of the largest
 
     @property
     def beyond(self) -> float:
@@ -266,13 +266,13 @@ class _Log:
         both = np.array(self.frames[self.keys[message.name]]).reshape(-1, 2)
         return both[:, 0], both[:, 1]
 
-    def during(self, begin: float, end: float) -> During:
+    def during(self, begin: float, end: float) -> BusOccupancy:
         """Who had the bus from `begin` to `end`, s."""
         starts, ends, foreign = np.array(self._bus).T
         taken = np.clip(np.minimum(ends, end) - np.maximum(starts, begin), 0.0, None)
         other = float(taken[foreign > 0.0].sum())
         own = float(taken.sum()) - other
-        return During(own, other, max(0.0, end - begin - own - other))
+        return BusOccupancy(own, other, max(0.0, end - begin - own - other))
 
     def wire(self) -> Wire:
         """Bit rate and doubt by the closest frames: those that waited for the one before end just their bits later."""
@@ -312,7 +312,7 @@ def _row(row: Row, message: Message, log: _Log, paired: Paired) -> Delays:
     delays = paired.delays
     place = int(paired.least.argmax()) if len(delays) else None
     largest = None if place is None else float(paired.least[place])
-    at, during = None, During()
+    at, during = None, BusOccupancy()
     if place is not None and largest is not None:
         end = float(log.of(message)[1][paired.places[place]])
         at, during = end - INTERFRAME / log.bitrate, log.during(end - largest, end)

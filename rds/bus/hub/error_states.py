@@ -15,7 +15,7 @@ from pathlib import Path
 SEATS = 1 << 16
 
 
-class Board:
+class ErrorStateFile:
     """The hub's end: makes the file at `path`, and removes it. OSError if there is no room for it."""
 
     def __init__(self, path: Path):

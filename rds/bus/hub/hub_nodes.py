@@ -9,7 +9,7 @@ import time
 
 from rds.bus.hub import wire
 from rds.bus.hub.address import Address, foreign_user
-from rds.bus.hub.error_states import SEATS, Board
+from rds.bus.hub.error_states import SEATS, ErrorStateFile
 from rds.bus.hub.hub_node import Node, State
 from rds.bus.hub.hub_requests import Requests
 from rds.bus.hub.poller import READ, WRITE, make_poller
@@ -33,7 +33,7 @@ class HubNodes:
         self._poller.register(self._listener.fileno(), READ)
         self._medium: Medium[Node] = UntimedMedium()
         self._requests = Requests(self._medium, self._note, time.monotonic_ns())
-        self._board: Board | None = None
+        self._board: ErrorStateFile | None = None
         self._paused: set[Node] = set()  # those whose controllers are full
         self._nodes: dict[int, Node] = {}  # by file descriptor
         self._members: list[Node] = []  # those on the bus
@@ -120,7 +120,7 @@ class HubNodes:
             from rds.bus.medium.timed_medium import TimedMedium  # the untimed bus starts without its tables
 
             try:
-                self._board = Board(self._address.board_path)
+                self._board = ErrorStateFile(self._address.board_path)
             except OSError as error:
                 raise wire.WireError(f"the board of the bus cannot be made: {error.strerror}") from error
             self._medium = TimedMedium(settings.bitrate, settings.data_bitrate or None, self._show)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rds.bus.hub.bus_settings import SERIAL
-from rds.bus.tools.beyond import OPTION, refuse_network
+from rds.bus.tools.network_channels import OPTION, refuse_network
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Machine
 

@@ -38,7 +38,7 @@ LIMIT = 65536  # frames: as many as the hub of the built-in bus keeps for a node
 _LOOK = 0.2  # s after which the thread looks whether it shall end, and at the bus's state
 
 
-class Trouble(StrEnum):
+class ReceiveFault(StrEnum):
     """What went wrong."""
 
     BUS = "bus"
@@ -52,7 +52,7 @@ class Trouble(StrEnum):
 class Fault:
     """One report."""
 
-    trouble: Trouble
+    trouble: ReceiveFault
     text: str
     error: BaseException | None = None
 
@@ -163,7 +163,7 @@ class Receiver:
                     if not self._reopen:
                         break
         except BaseException as error:  # SystemExit in a driver, for one
-            self._report(Trouble.ENDED, f"{self._name} is read no more: {_say(error)}", error)
+            self._report(ReceiveFault.ENDED, f"{self._name} is read no more: {_say(error)}", error)
         finally:
             self._close_bus()
             for subscription in self._subscriptions:
@@ -179,7 +179,7 @@ class Receiver:
                 for subscription in self._subscriptions:
                     if subscription.put(message):
                         self._report(
-                            Trouble.OVERFLOW,
+                            ReceiveFault.OVERFLOW,
                             f"{subscription.name} is {subscription.limit} frames behind {self._name}; it loses frames",
                         )
             now = time.monotonic()
@@ -204,7 +204,7 @@ class Receiver:
         self._close_bus()
         if first:
             self.outages += 1
-            trouble = Trouble.BUS_OFF if isinstance(error, _BusOff) else Trouble.BUS
+            trouble = ReceiveFault.BUS_OFF if isinstance(error, _BusOff) else ReceiveFault.BUS
             next_ = "it is opened again" if self._reopen else "it is read no more"
             self._report(trouble, f"{self._name} failed: {_say(error)}; {next_}", error)
         else:
@@ -231,7 +231,7 @@ class Receiver:
                     function(message)
         except BaseException as error:
             text = f"{subscription.name} failed: {_say(error)}; it gets no more frames"
-            self._report(Trouble.SUBSCRIBER, text, error)
+            self._report(ReceiveFault.SUBSCRIBER, text, error)
         finally:
             self._forget(subscription)
 
@@ -242,7 +242,7 @@ class Receiver:
 
     # --- reports
 
-    def _report(self, trouble: Trouble, text: str, error: BaseException | None = None) -> None:
+    def _report(self, trouble: ReceiveFault, text: str, error: BaseException | None = None) -> None:
         LOG.error("%s", text)
         _call(self._on_error, Fault(trouble, text, error))
 

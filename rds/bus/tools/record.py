@@ -17,7 +17,7 @@ from typing import Any
 import can
 
 from rds.bus.tools.logs import LogWriter, ending
-from rds.bus.tools.receiver import Fault, Receiver, Trouble
+from rds.bus.tools.receiver import Fault, ReceiveFault, Receiver
 from rds.bus.tools.selection import Selection
 
 FLUSH = 0.5  # s between flushes
@@ -67,7 +67,7 @@ def record(
     result = Recording(str(path))
 
     def note(fault: Fault) -> None:
-        if fault.trouble is not Trouble.OVERFLOW:  # those are counted
+        if fault.trouble is not ReceiveFault.OVERFLOW:  # those are counted
             result.faults.append(fault.text)
 
     receiver = Receiver(open_bus, note, name=name)

@@ -12,7 +12,7 @@ from typing import Any
 
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.assignment.by_heart import in_a_notebook, of_interpolators, table_of_voltages
-from rds.grading.assignment.tried import DECIDES, Tried
+from rds.grading.assignment.trial_grades import DECIDES, TrialGrades
 from rds.grading.batch.grade_one import Opener
 from rds.grading.cases.case import COUNTS, LINEAR
 from rds.grading.criteria.criterion import Criterion
@@ -152,7 +152,7 @@ def audit(
     cases: list[Any] = list(assignment.cases)
     if solution is None or solution.suffix != ".py" or assignment.kind not in ("controller", "interpolator"):
         return [], _tables(assignment.criteria)
-    tried = Tried(assignment, pool, [each for each in assignment.criteria if COUNTS not in each.needs], announce)
+    tried = TrialGrades(assignment, pool, [each for each in assignment.criteria if COUNTS not in each.needs], announce)
     if assignment.kind == "interpolator":
         return of_interpolators(tried, solution, reference), []
     if any(case.is_coupled for case in cases):

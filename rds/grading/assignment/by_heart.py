@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rds.grading.assignment.tried import Tried
+from rds.grading.assignment.trial_grades import TrialGrades
 from rds.grading.cases.case import CaseRun
 from rds.grading.grade import Grade
 from rds.grading.intake.notebooks import converted
@@ -95,7 +95,7 @@ def table_of_voltages(runs: Iterable[CaseRun]) -> str:
     return _NUMBERS + _VOLTAGES.format(known=known)
 
 
-def of_interpolators(tried: Tried, solution: Path, reference: Grade) -> list[str]:
+def of_interpolators(tried: TrialGrades, solution: Path, reference: Grade) -> list[str]:
     """Faults: honest interpolators that earn nothing, tables and jumps that earn too much."""
     text = solution.read_text(encoding="utf-8")
     faults: list[str] = []

@@ -19,11 +19,11 @@ from rds.core.load import StudentFile, load_student
 from rds.core.types import Reference, Segment
 from rds.grading.cases.case import Row
 from rds.grading.grade import Status
-from rds.grading.sandbox.counts import Counts
 from rds.grading.sandbox.errors import SubmissionError
 from rds.grading.sandbox.inside.plain import NotPlain, plain
 from rds.grading.sandbox.limits import Limits
 from rds.grading.sandbox.submission import read_submission
+from rds.grading.sandbox.work_counts import WorkCounts
 from rds.machines.converter import as_voltage
 from rds.models.student import student_model
 from rds.modes.loop.laws import LiveReference, controlled, coupled
@@ -63,9 +63,9 @@ class TrustedFile:
             return tuple(name for name, value in _functions(self._path).items() if callable(value))
 
     @property
-    def counts(self) -> Counts:
+    def counts(self) -> WorkCounts:
         """Its calls; events are counted in the sandbox only."""
-        return Counts(self._calls, refused="work is counted in the sandbox only")
+        return WorkCounts(self._calls, refused="work is counted in the sandbox only")
 
     def begin_control(self, params: Mapping[str, Any], initial_state: Any, T: float, axes: Sequence[str]) -> None:
         """A fresh run of the controller."""

@@ -16,8 +16,8 @@ from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.course.class_list import ClassList, read_class_list
 from rds.grading.grade import LISTED, Grade, Status
 from rds.grading.intake.names import safe_id
+from rds.grading.review.class_grades import everyone
 from rds.grading.review.entries import Review, read_review
-from rds.grading.review.everyone import everyone
 
 STUDENTS, GRADE, FEEDBACK = "students", "grade.json", "feedback.html"
 CODE, COLUMNS = "submission.py", "columns.parquet"  # what a submission is called in messages to its author, too

@@ -61,7 +61,7 @@ class Graded:
     runs: tuple[CaseRun, ...]
 
 
-class Opened:
+class OpenSubmission:
     """A submission whose subjects are loaded when they are first asked for, and ended with it."""
 
     def __init__(self, path: Path, assignment: Assignment, pool: Opener):
@@ -199,7 +199,7 @@ class _Work:
         tested = [each for each in self.criteria if each.tests and self._hides(each) is is_hidden]
         if self._stopped or not (cases or tested):
             return
-        opened = Opened(path, self.assignment, pool)
+        opened = OpenSubmission(path, self.assignment, pool)
         try:
             self._part(opened, cases, tested)
         finally:
@@ -214,7 +214,7 @@ class _Work:
     def _hides(self, part: Case | Criterion) -> bool:
         return not part.is_visible and self.assignment.feedback != "all"
 
-    def _part(self, opened: Opened, cases: Sequence[Case], tested: Sequence[Criterion]) -> None:
+    def _part(self, opened: OpenSubmission, cases: Sequence[Case], tested: Sequence[Criterion]) -> None:
         if cases:
             try:
                 opened.subject()
@@ -237,7 +237,7 @@ class _Work:
                 if self._stopped:
                     return
 
-    def _needs_a_function(self, opened: Opened) -> None:
+    def _needs_a_function(self, opened: OpenSubmission) -> None:
         """SubmissionError where functions are handed in, and the file has none of those that are tested."""
         names = {test.function for criterion in self.assignment.criteria for test in criterion.tests}
         shown = sorted({t.function for c in self.assignment.criteria if not self._hides(c) for t in c.tests})
@@ -247,7 +247,7 @@ class _Work:
             said += "".join(f"; it has {own}(); did you mean {name}()?" for own, name in islice(close, 1))
             raise SubmissionError(Status.FAILED_TO_LOAD, f"it defines none of what is asked for: {said}")
 
-    def _run(self, case: Case, opened: Opened) -> None:
+    def _run(self, case: Case, opened: OpenSubmission) -> None:
         needs = {need for criterion in self.criteria if case.name in criterion.cases for need in criterion.needs}
         for number in range(case.runs):
             run = case.run(opened, self.seed, number, needs)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from rds.grading.criteria.linear import LinearLoop, NoLoop
-    from rds.grading.sandbox.counts import Counts
+    from rds.grading.sandbox.work_counts import WorkCounts
     from rds.results import Result
 
 COUNTS, LINEAR = "counts", "linear"
@@ -29,7 +29,7 @@ class Answers(Protocol):
     def defines(self) -> tuple[str, ...]: ...
 
     @property
-    def counts(self) -> Counts: ...
+    def counts(self) -> WorkCounts: ...
 
     def begin_control(self, params: Any, initial_state: Any, T: float, axes: Any) -> None: ...
 
@@ -67,7 +67,7 @@ class CaseRun:
     number: int
     result: Result
     fault: str = ""
-    counts: Counts | None = None
+    counts: WorkCounts | None = None
     linear: tuple[LinearLoop | NoLoop, ...] | None = None  # of each axis
     facts: Mapping[str, Any] | None = None  # of the case: when a disturbance begins, the converter's limits, ...
     rows: np.ndarray | None = None

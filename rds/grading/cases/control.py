@@ -16,9 +16,9 @@ from rds.grading.assignment.seeds import part_seed
 from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
 from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts
 from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_model, noise_of, read_disturbance
-from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
+from rds.grading.cases.words import CommonFields, as_own_file, inside, read_common, read_spread
+from rds.grading.criteria.applied_force import begin_of, force, free_stretch
 from rds.grading.criteria.linear import SWITCHES, LinearLoop, NoLoop, linear_loop, switches, switches_again
-from rds.grading.criteria.pushed import begin_of, force, free_stretch
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
 from rds.identification.robustness.draws import Spread
@@ -41,7 +41,7 @@ _STANDS_IN = Controller(lambda t, r, y, state, params: (0.0, state))
 class ControlCase:
     """A plan with everything but the submission; the plants of each run are drawn from a student's seed."""
 
-    common: Common
+    common: CommonFields
     plan: Plan
     periods: dict[str, float | None]
     plants: tuple[Uncertain, ...]

@@ -15,7 +15,7 @@ from rds.grading.cases.case import COUNTS, CaseRun, Submitted
 from rds.grading.cases.control import plants_of
 from rds.grading.cases.loop import run_loop
 from rds.grading.cases.plant import disturbed, drawn_model, noise_of
-from rds.grading.cases.words import Common, as_own_file, inside, read_common
+from rds.grading.cases.words import CommonFields, as_own_file, inside, read_common
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
 from rds.identification.robustness.uncertain import Uncertain
@@ -31,7 +31,7 @@ _NOT_HERE = ("mode", "controller", "bus", "network", "timing", "compiled", "refe
 class ModelCase:
     """Voltages and what an axis answered; the submission gets the voltages one by one, and never the answers."""
 
-    common: Common
+    common: CommonFields
     params: dict[str, Any]
     unit: str
     files: tuple[str, ...]
@@ -111,7 +111,7 @@ def read(words: TomlTable, folder: Path, machine: str) -> ModelCase:
     return ModelCase(common, params, unit, tuple(files), plan=plan, plants=plants, noise=noise)
 
 
-def _of_log(words: TomlTable, common: Common, params: dict[str, Any], folder: Path, log: str) -> ModelCase:
+def _of_log(words: TomlTable, common: CommonFields, params: dict[str, Any], folder: Path, log: str) -> ModelCase:
     from rds.identification.logs.read_log import read_log
 
     mapping, axis = inside(words, "map", folder), words.read("axis")

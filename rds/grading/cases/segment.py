@@ -15,7 +15,7 @@ from rds.core.geometry import length
 from rds.core.toml_table import TomlTable
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.grading.cases.case import COUNTS, CaseRun, Submitted
-from rds.grading.cases.words import Common, as_own_file, inside, read_common
+from rds.grading.cases.words import CommonFields, as_own_file, inside, read_common
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
 from rds.interpolators.segment import checked
@@ -30,7 +30,7 @@ _SLOWER, _SPARE = 10, 5000  # rows: so much longer than at constant speed, for a
 class SegmentCase:
     """A segment with its sample period, s. The first sample is the segment's start, at rest, before any row."""
 
-    common: Common
+    common: CommonFields
     segment: Segment
     T: float
     params: dict[str, Any]

@@ -16,7 +16,7 @@ Ranges = dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class Common:
+class CommonFields:
     """What a case of any kind says."""
 
     name: str
@@ -37,7 +37,7 @@ def as_own_file(words: TomlTable, defaults: dict[str, Any]) -> TomlTable:
     )
 
 
-def read_common(words: TomlTable) -> Common:
+def read_common(words: TomlTable) -> CommonFields:
     """Name, title, visibility and number of runs."""
     name = words.read("name")
     if not name or not re.fullmatch(r"[\w .()+-]{1,80}", name):
@@ -46,7 +46,7 @@ def read_common(words: TomlTable) -> Common:
             words.place("name"),
         )
     runs = words.read("runs")
-    return Common(name, words.read("title", name) or name, words.read("visible"), runs)
+    return CommonFields(name, words.read("title", name) or name, words.read("visible"), runs)
 
 
 def inside(words: TomlTable, key: str, folder: Path) -> str | None:

@@ -13,7 +13,7 @@ from rds.grading.batch.finished import Finished
 from rds.grading.exports import one_json
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.pictures import Picture
-from rds.grading.exports.said import of_criterion, of_grade, printed
+from rds.grading.exports.wording import of_criterion, of_grade, printed
 from rds.grading.grade import Band, CriterionScore, Grade, Status
 
 FILE = "gradescope"

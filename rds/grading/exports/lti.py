@@ -14,7 +14,7 @@ from rds.core.extras import needed_for
 from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.roster import identifiers, source
-from rds.grading.exports.said import of_grade
+from rds.grading.exports.wording import of_grade
 from rds.grading.grade import Grade
 from rds.grading.lti.launches import Launched, read_launches, student_of
 from rds.grading.lti.registration import LAUNCHES, read_registration, tool_config, tool_key

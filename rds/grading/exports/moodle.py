@@ -12,7 +12,7 @@ from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import csv_text
 from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.roster import Key, Sheet, find, identifiers, names_here, platform, read_sheet, source, unknown
-from rds.grading.exports.said import comment
+from rds.grading.exports.wording import comment
 from rds.grading.grade import Grade
 from rds.grading.intake.names import letters
 

@@ -9,7 +9,7 @@ from rds.grading.batch.finished import Finished
 from rds.grading.exports import one_json
 from rds.grading.exports.exported import Exported, ExportOptions
 from rds.grading.exports.pictures import Picture
-from rds.grading.exports.said import of_criterion, of_grade, printed
+from rds.grading.exports.wording import of_criterion, of_grade, printed
 from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import CriterionScore, Grade, Status
 

@@ -13,8 +13,8 @@ from rds.grading.feedback import histogram
 from rds.grading.feedback.plain_text import isolated, one_line
 from rds.grading.grade import Band, CriterionScore, Grade, Status, with_unit
 from rds.grading.review.applied import is_changed, of_review
+from rds.grading.review.class_grades import SECTION
 from rds.grading.review.entries import Kind, Review
-from rds.grading.review.everyone import SECTION
 from rds.results import html
 from rds.results.report import around
 

@@ -28,7 +28,7 @@ from rds.grading.intake.bindings import (
     table_of,
 )
 from rds.grading.intake.files import Files
-from rds.grading.intake.overwritten import SetAgain
+from rds.grading.intake.overwritten import Overwriting
 
 _BY_FIRST_ARGUMENT = frozenset({"setattr", "delattr", "setitem", "delitem"})
 """Functions that change their first argument, whatever module they are taken from."""
@@ -78,7 +78,7 @@ def needed(body: Sequence[ast.stmt], wanted: set[str]) -> tuple[set[int], tuple[
     distinct = {id(names): names for names in absent}
     wider = {number: names | elsewhere.keys() for number, names in distinct.items()}
     there_too = [wider[id(names)] for names in absent]
-    is_set_again = SetAgain(body)
+    is_set_again = Overwriting(body)
     _follow(body, makes, keep, known, there_too, is_set_again)
     _leave_out(body, makes, keep, there_too, is_set_again)
     able = _able(body, keep, there_too)
@@ -125,7 +125,7 @@ def _follow(
     keep: set[int],
     known: set[str],
     absent: Sequence[Set[str]],
-    is_set_again: SetAgain,
+    is_set_again: Overwriting,
 ) -> None:
     """Keep also what may change the data in ways that its text does not name. NotFollowed where that cannot be run."""
     modules = dict(chain.from_iterable(map(imported, body)))
@@ -162,7 +162,7 @@ _NEEDS_MORE = "it may change what is graded, and needs files or modules that are
 
 
 def _leave_out(
-    body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent: Sequence[Set[str]], is_set_again: SetAgain
+    body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent: Sequence[Set[str]], is_set_again: Overwriting
 ) -> None:
     """Leave out what cannot be run, where what it makes is set again later, or used only by what is left out as well.
 

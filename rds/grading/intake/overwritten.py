@@ -24,7 +24,7 @@ class _Set:
     keys: frozenset[object] | None = None
 
 
-class SetAgain:
+class Overwriting:
     """Asked of one notebook, statement by statement; what is the same for all of them is looked up once."""
 
     def __init__(self, body: Sequence[ast.stmt]) -> None:

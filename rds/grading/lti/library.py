@@ -22,7 +22,7 @@ _MOST = 10_000  # of what is kept: who sends logins without end fills no memory
 _LIFE = 600.0  # s
 
 
-class Given(Request):
+class LtiRequest(Request):
     """One request: its fields, and whether the browser came by https."""
 
     def __init__(self, fields: Mapping[str, str], is_https: bool):
@@ -87,7 +87,7 @@ class Storage(LaunchDataStorage[Any]):
         return is_kept
 
 
-class Away(Redirect[str]):
+class RedirectTo(Redirect[str]):
     """An address to be sent to."""
 
     def __init__(self, url: str):
@@ -113,9 +113,9 @@ class Away(Redirect[str]):
 class Login(OIDCLogin[Any, Any, Any, Any, Any]):
     """The first step: the platform says who is to be launched, and is asked to prove it."""
 
-    def get_redirect(self, url: str) -> Away:
+    def get_redirect(self, url: str) -> RedirectTo:
         """Where the browser is sent."""
-        return Away(url)
+        return RedirectTo(url)
 
 
 class Launch(MessageLaunch[Any, Any, Any, Any]):
@@ -142,6 +142,6 @@ class Connector(ServiceConnector):
 
 def session(storage: Storage) -> SessionService:
     """The library's session over the storage."""
-    made = SessionService(Given({}, True))
+    made = SessionService(LtiRequest({}, True))
     made.set_data_storage(storage)
     return made

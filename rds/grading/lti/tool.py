@@ -70,12 +70,12 @@ class Tool:
 
     def login(self, fields: Mapping[str, str]) -> tuple[str, dict[str, tuple[str, int]]]:
         """Where to send the browser, and its cookies. Refused where the platform is not the registered one."""
-        from rds.grading.lti.library import Cookies, Given, Login, session
+        from rds.grading.lti.library import Cookies, Login, LtiRequest, session
 
         cookies = Cookies({})
         with self._lock:
             login = Login(
-                Given(fields, self.is_https),
+                LtiRequest(fields, self.is_https),
                 self._config,
                 session_service=session(self._storage),
                 cookie_service=cookies,
@@ -88,11 +88,11 @@ class Tool:
     def launch(self, fields: Mapping[str, str], sent: Mapping[str, str]) -> tuple[str, Launched]:
         """A pass for handing in, and who it is. Refused where the message is not the platform's own, for this "
         "tool, now."""
-        from rds.grading.lti.library import Cookies, Given, Launch, session
+        from rds.grading.lti.library import Cookies, Launch, LtiRequest, session
 
         with self._lock:
             launch = Launch(
-                Given(fields, self.is_https),
+                LtiRequest(fields, self.is_https),
                 self._config,
                 session_service=session(self._storage),
                 cookie_service=Cookies(sent),

@@ -9,23 +9,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rds.grading.sandbox.counts import Counts
     from rds.grading.sandbox.errors import SandboxError, SubmissionError
     from rds.grading.sandbox.limits import Limits
+    from rds.grading.sandbox.loaded_submission import Loaded, LoadedSubmission
     from rds.grading.sandbox.pool import Pool
     from rds.grading.sandbox.requirements import available
-    from rds.grading.sandbox.subject import Loaded, LoadedSubmission
+    from rds.grading.sandbox.work_counts import WorkCounts
 
-__all__ = ["Counts", "Limits", "Loaded", "LoadedSubmission", "Pool", "SandboxError", "SubmissionError", "available"]
+__all__ = ["Limits", "Loaded", "LoadedSubmission", "Pool", "SandboxError", "SubmissionError", "WorkCounts", "available"]
 
 _MODULES = {
-    "Counts": "counts",
     "Limits": "limits",
-    "Loaded": "subject",
-    "LoadedSubmission": "subject",
+    "Loaded": "loaded_submission",
+    "LoadedSubmission": "loaded_submission",
     "Pool": "pool",
     "SandboxError": "errors",
     "SubmissionError": "errors",
+    "WorkCounts": "work_counts",
     "available": "requirements",
 }
 

@@ -16,13 +16,13 @@ from typing import Any, NoReturn
 
 from rds.grading.grade import Status
 from rds.grading.sandbox import frames
-from rds.grading.sandbox.asleep import Asleep
 from rds.grading.sandbox.budget import FLOOD, Budget
-from rds.grading.sandbox.door import make_bell, make_memory
 from rds.grading.sandbox.errors import SandboxError, SubmissionError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.output import Output, printable
 from rds.grading.sandbox.processes import ended_for_memory, turns_of, usage
+from rds.grading.sandbox.shared_channel import make_bell, make_memory
+from rds.grading.sandbox.sleep_time import SleepTime
 from rds.grading.sandbox.supervise import Supervisor
 
 _START = 60.0  # s that the kernel may take for three forks on a busy computer
@@ -43,7 +43,7 @@ class Cell:
         self._budget, self._supervisor = budget, supervisor
         self._verdict: tuple[Status, str] | None = None
         self._cpu, self._computed, self._turn_seen, self._turn_time = 0.0, 0.0, 0, 0.0
-        self._asleep, self._grader = Asleep(), threading.get_native_id()
+        self._asleep, self._grader = SleepTime(), threading.get_native_id()
         self._baseline = interpreter.resident_bytes
         self.is_closed = False
         self.signs: list[Callable[[], bool]] = []  # whether an answer is there that came by another way than the pipe

@@ -10,9 +10,9 @@ from types import TracebackType
 from rds.grading.sandbox.errors import SandboxError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.limits import Limits
-from rds.grading.sandbox.place import Place
+from rds.grading.sandbox.loaded_submission import LoadedSubmission
+from rds.grading.sandbox.processors import Processors
 from rds.grading.sandbox.requirements import available, fault_of, missing
-from rds.grading.sandbox.subject import LoadedSubmission
 from rds.grading.sandbox.submission import read_submission
 from rds.grading.sandbox.supervise import Supervisor
 from rds.grading.sandbox.user import sandbox_user
@@ -66,7 +66,7 @@ class Pool:
         """
         submission = read_submission(Path(path))
         kit = _kit([name for name in KITS[-1] if submission.imports(name)])
-        place = Place.of(self._jobs, self._slot)
+        place = Processors.of(self._jobs, self._slot)
         return LoadedSubmission(
             submission, kind, limits or Limits(), lambda: self._interpreter(kit), self._supervisor, place
         )

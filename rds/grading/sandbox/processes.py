@@ -10,7 +10,7 @@ _TICK = 1.0 / os.sysconf("SC_CLK_TCK")
 _HELD = re.compile(rb"^Vm(?:RSS|Swap):\s*(\d+) kB$", re.MULTILINE)
 
 
-class Turns(NamedTuple):
+class ThreadTimes(NamedTuple):
     """What a thread has done so far, s; what is missing in the time that has gone by it was asleep."""
 
     computed: float
@@ -25,7 +25,7 @@ class Usage(NamedTuple):
     processes: int
     first_seconds: float  # computing time of the first of them, the one that answers
     first_runs: bool  # whether that one computes, or would if it had a processor
-    first_thread: Turns | None  # of that one's first thread; None if this kernel does not tell
+    first_thread: ThreadTimes | None  # of that one's first thread; None if this kernel does not tell
     first_sleeps: int  # how often that thread has gone to sleep by its own will
 
 
@@ -51,10 +51,10 @@ def usage(top: int, baseline: int = 0) -> Usage:
     return Usage(cpu, memory, count, _cpu(first, True, False), first[:1] == [b"R"], turns, sleeps)
 
 
-def turns_of(process: int, thread: int | None = None) -> Turns | None:
+def turns_of(process: int, thread: int | None = None) -> ThreadTimes | None:
     """Of one of a process's threads (default: the first); None if this kernel does not tell, or it has gone."""
     fields = _read(f"/proc/{process}/task/{thread or process}/schedstat").split()
-    return Turns(int(fields[0]) * 1e-9, int(fields[1]) * 1e-9) if len(fields) > 1 else None
+    return ThreadTimes(int(fields[0]) * 1e-9, int(fields[1]) * 1e-9) if len(fields) > 1 else None
 
 
 def ended_for_memory() -> int:

@@ -111,15 +111,17 @@ def _remedy(said: str) -> str:
 
 def _holes(interpreter: Interpreter) -> list[str]:
     from rds.grading.sandbox.inside import probe
-    from rds.grading.sandbox.place import Place
-    from rds.grading.sandbox.subject import LoadedSubmission
+    from rds.grading.sandbox.loaded_submission import LoadedSubmission
+    from rds.grading.sandbox.processors import Processors
     from rds.grading.sandbox.submission import Submission
     from rds.grading.sandbox.supervise import Supervisor
 
     supervisor = Supervisor()
     text = Submission("probe.py", Path(probe.__file__).read_bytes())  # installers make hard links, which are refused
     try:
-        with LoadedSubmission(text, "functions", _TRIAL, lambda: interpreter, supervisor, Place.of(1, None)) as trial:
+        with LoadedSubmission(
+            text, "functions", _TRIAL, lambda: interpreter, supervisor, Processors.of(1, None)
+        ) as trial:
             user, process = trial.call("identity")
             tried = {
                 "a submission would be root": user == 0,

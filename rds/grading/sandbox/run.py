@@ -10,8 +10,8 @@ from typing import Any, NoReturn
 from rds.grading.grade import Status
 from rds.grading.sandbox import records
 from rds.grading.sandbox.cell import Cell
-from rds.grading.sandbox.door import Closed, Door
 from rds.grading.sandbox.output import printable
+from rds.grading.sandbox.shared_channel import ChannelClosed, SharedChannel
 
 LONGEST_REASON = 600  # characters of what a submission's error says
 
@@ -36,10 +36,10 @@ class Run:
         self._seal, self._ok = seal, records.OK ^ seal
         self._asked: list[tuple[float, ...]] = []
         self._answered: list[tuple[Any, ...]] = []
-        self._door: Door | None = None
+        self._door: SharedChannel | None = None
         if through_door:
             memory, question_bell, answer_bell = cell.door
-            self._door = Door(memory, answer_bell, question_bell, cell.answers, asks=True)
+            self._door = SharedChannel(memory, answer_bell, question_bell, cell.answers, asks=True)
             cell.signs.append(self._has_answer)
         self._exchange = self._door.asker(layout) if self._door else self._pipes()
 
@@ -54,7 +54,7 @@ class Run:
         cell.turn += 1
         try:
             answer = self._exchange(k, values)
-        except Closed:
+        except ChannelClosed:
             cell.fail()
         # a sum is finite only if all its parts are; the other way round it may only be too large
         if answer[0] != k or answer[1] != self._ok or not isfinite(sum(answer)):
@@ -74,7 +74,7 @@ class Run:
             try:
                 write(questions, pack(k, *values))
             except BrokenPipeError:
-                raise Closed from None
+                raise ChannelClosed from None
             data = read(answers, size)
             return unpack(data if len(data) == size else cell.receive(size, data))
 
@@ -97,7 +97,7 @@ class Run:
         self.cell.turn += 1
         try:
             number, code, told, *_ = self._exchange(records.TOTAL, (0.0,) * self.layout.asks)
-        except Closed:
+        except ChannelClosed:
             self.cell.fail()
         if number != records.TOTAL or code != self._ok or not isfinite(told):
             self.give_up("it wrote into the grader's pipe")

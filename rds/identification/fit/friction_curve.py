@@ -49,7 +49,7 @@ class SteadyPoint:
 
 
 @dataclass(frozen=True)
-class Told:
+class EstimatedValue:
     """A number of the curve with its standard error, and the 95 % interval (Student's t where points are few)."""
 
     value: float
@@ -64,7 +64,7 @@ class FrictionCurve:
     """Points, the numbers of each direction ("forward", "backward") by name, and what the points cannot tell."""
 
     points: tuple[SteadyPoint, ...]
-    directions: Mapping[str, Mapping[str, Told]]
+    directions: Mapping[str, Mapping[str, EstimatedValue]]
     unidentifiable: tuple[str, ...]
     speed_unit: str
     force_unit: str
@@ -113,7 +113,7 @@ def friction_curve(logs: Sequence[Log]) -> FrictionCurve:
             f"{', '.join(unused)}: no stretch of these logs keeps its speed within {100 * _STEADY:g} %, so nothing of "
             "them is in the curve"
         )
-    directions: dict[str, Mapping[str, Told]] = {}
+    directions: dict[str, Mapping[str, EstimatedValue]] = {}
     for way, name in ((1.0, "forward"), (-1.0, "backward")):
         of_way = [point for point in points if way * point.speed > 0.0]
         if not of_way:
@@ -184,7 +184,7 @@ def _point(log: Log, first: int, end: int, speed: float, gain: float) -> SteadyP
 
 def _fitted(
     points: Sequence[SteadyPoint], way: float, speed_unit: str, force_unit: str, output: str
-) -> tuple[dict[str, Told], list[str]]:
+) -> tuple[dict[str, EstimatedValue], list[str]]:
     """The numbers of one direction, and what its points cannot tell."""
     v = np.array([way * point.speed for point in points])
     f = np.array([way * point.force for point in points])
@@ -229,7 +229,7 @@ class _Solved:
     def left(self) -> float:
         return float(np.sum(self.residual**2))
 
-    def told(self, row: np.ndarray, unit: str) -> Told:
+    def told(self, row: np.ndarray, unit: str) -> EstimatedValue:
         """The number `row @ values`."""
         weights = self.slopes @ np.linalg.pinv(self.slopes.T @ self.slopes) @ row  # of each point in it
         freedom = len(self.residual) - len(self.values)
@@ -237,13 +237,13 @@ class _Solved:
         within = float(np.linalg.norm(weights * self.own))
         reach = max(t_quantile(freedom) * scatter, t_quantile(np.inf) * within)
         value = float(row @ self.values)
-        return Told(value, max(scatter, within), unit, value - reach, value + reach)
+        return EstimatedValue(value, max(scatter, within), unit, value - reach, value + reach)
 
 
 def _stribeck(
     v: np.ndarray, f: np.ndarray, own: np.ndarray, theta: np.ndarray, vs: float, speed_unit: str, force_unit: str,
     output: str,
-) -> dict[str, Told]:  # fmt: skip
+) -> dict[str, EstimatedValue]:  # fmt: skip
     """All four numbers, refined together from the best of the grid."""
     with needed_for("a friction curve"):
         from scipy.optimize import least_squares

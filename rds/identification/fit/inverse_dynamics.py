@@ -65,7 +65,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Found:
+class RegressionResult:
     """What the regression says, in the structure's parameters without those that are given."""
 
     values: dict[str, float]
@@ -132,7 +132,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     )
 
 
-def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Found:
+def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> RegressionResult:
     """The regression alone, over all logs together."""
     form = motion_form(structure)
     fixed = _fixed(options.get(FIXED) or {}, form, structure)
@@ -163,7 +163,7 @@ def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str
             else "gain and friction come only together: the motion is at one speed; log other speeds, or hold K (--fix)"
         )
         raise InputError(why, logs[0].name)
-    return Found(
+    return RegressionResult(
         values=dict(zip(form.names, form.values(theta).tolist(), strict=True)),
         covariance=_held_out(form.covariance(theta, regression.covariance), form, fixed),
         regression=regression,
@@ -347,7 +347,7 @@ def _with_signs(
     )
 
 
-def _ordinary(found: Found) -> np.ndarray:
+def _ordinary(found: RegressionResult) -> np.ndarray:
     """Standard errors if the residuals were white, as the authors state them."""
     spread = np.diag(found.regression.ordinary**2)
     full = found.regression.covariance
@@ -360,7 +360,7 @@ def _ordinary(found: Found) -> np.ndarray:
     return np.sqrt(np.diag(_held_out(covariance, found.form, found.fixed)))
 
 
-def _warnings(found: Found) -> list[str]:
+def _warnings(found: RegressionResult) -> list[str]:
     said = []
     regression = found.regression
     if found.held:

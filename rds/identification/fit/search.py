@@ -19,7 +19,7 @@ from rds.identification.fit.residuals import effective_samples
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.fit.solve import Solution, least_squares, tells_all
 from rds.identification.logs.log import Log
-from rds.identification.structures.structure import Idle, Start, Structure
+from rds.identification.structures.structure import HiddenParameter, Start, Structure
 
 _ENOUGH = 1.5  # times the noise: residuals that are no larger, and not smooth, hold nothing more
 _SMOOTH = 0.5  # correlation of neighbouring residuals from which they hold motion
@@ -34,7 +34,7 @@ _SAME = 0.01  # of the noise: runs that differ by less are the same
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """Where the searches ended. `unmoved` were held: the data give no occasion to tell them."""
 
     problem: Problem
@@ -49,7 +49,7 @@ def find(
     holding: Mapping[str, float],
     starts: Iterable[Start],
     tick: Callable[[], None],
-) -> Found:
+) -> SearchResult:
     """The best fit with the parameters in `holding` held. InputError where the free run from a start is not finite."""
     given = iter(starts)
     first = next(given)
@@ -66,7 +66,7 @@ def find(
     return _guessed(still, idle, min(without.rms(still.solution.squares), *(motion_of(log).noise for log in logs)))
 
 
-def _by_chance(found: Found) -> float:
+def _by_chance(found: SearchResult) -> float:
     """What one parameter more may take off the sum of squares where the truth does not need it.
 
     It may choose, among all N samples, where it shows: 2 ln N variances of a residual that is worth one sample.
@@ -99,7 +99,7 @@ def from_plain(
     yield from chain([(begun, states)], again)
 
 
-def _guessed(found: Found, idle: Mapping[str, Idle], noise: float) -> Found:
+def _guessed(found: SearchResult, idle: Mapping[str, HiddenParameter], noise: float) -> SearchResult:
     """With likely values in the place of those that hold out anything, where the free runs stay the same."""
     problem, point = found.problem, found.solution.point
     for name, how in idle.items():
@@ -109,10 +109,10 @@ def _guessed(found: Found, idle: Mapping[str, Idle], noise: float) -> Found:
             if all(np.abs(tried.response(point, i) - run).max() <= _SAME * noise for i, run in enumerate(runs)):
                 problem = tried
                 break
-    return Found(problem, found.solution, found.tried, tuple(idle))
+    return SearchResult(problem, found.solution, found.tried, tuple(idle))
 
 
-def _search(problem: Problem, starts: Iterable[Start]) -> Found:
+def _search(problem: Problem, starts: Iterable[Start]) -> SearchResult:
     """The best end of searches, up to the first that explains the measurement or ends where another did.
 
     The first may take its time; those after it show in few steps whether they lead to a better place, and only the best
@@ -151,7 +151,7 @@ def _search(problem: Problem, starts: Iterable[Start]) -> Found:
             continue
         best = _leave_bound(problem, best, number, begun[name])
         tried += 1
-    return Found(problem, best, tried)
+    return SearchResult(problem, best, tried)
 
 
 def stands_at_bound(problem: Problem, solution: Solution, number: int) -> bool:

@@ -24,7 +24,7 @@ from rds.identification.fit.free_run_doubts import is_little
 from rds.identification.fit.made_estimate import made_estimate, t_quantile
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.profile import widening
-from rds.identification.fit.search import Found, find, from_plain, stands_at_bound
+from rds.identification.fit.search import SearchResult, find, from_plain, stands_at_bound
 from rds.identification.fit.smoothing import encoder_step
 from rds.identification.fit.solve import EVALUATIONS, first_state
 from rds.identification.fit.suspicions import suspicions
@@ -124,7 +124,7 @@ def _widen(
     logs: Sequence[Log],
     structure: Structure,
     holding: Mapping[str, float],
-    found: Found,
+    found: SearchResult,
     uncertainty: Uncertainty,
 ) -> list[str]:
     """Widen the covariance where the motion is small beside the noise; the parameters whose intervals have no end."""

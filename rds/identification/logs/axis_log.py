@@ -15,7 +15,7 @@ from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import QUANTITIES, RATES, Clock, Finding, Gravity, Log
 from rds.identification.logs.map import LogMap
 from rds.identification.logs.map_axis import GAINS, AxisMap, ColumnMap
-from rds.identification.logs.second_file import Second
+from rds.identification.logs.second_file import SecondFile
 from rds.identification.logs.table import Table
 from rds.identification.logs.time_base import TimeBase, time_base
 from rds.machines.machine import Axis
@@ -38,7 +38,7 @@ class _Part:
     second: bool
 
 
-def axis_logs(table: Table, mapping: LogMap, about: AxisMap, second: Second | None) -> list[Log]:
+def axis_logs(table: Table, mapping: LogMap, about: AxisMap, second: SecondFile | None) -> list[Log]:
     """The logs of the axis: one, or one for each stretch between gaps. InputError as `read_log`."""
     machine_axis = mapping.machine.axis(about.machine_axis) if mapping.machine and about.machine_axis else None
     resolution = about.resolution
@@ -114,7 +114,7 @@ def _tells_nothing(log: Log) -> str:
 def _parts(
     table: Table,
     about: AxisMap,
-    second: Second | None,
+    second: SecondFile | None,
     machine_axis: Axis | None,
     resolution: float | None,
     findings: list[Finding],
@@ -165,14 +165,14 @@ def _completed(parts: dict[str, _Part], about: AxisMap, findings: list[Finding])
     return parts
 
 
-def _own_time(time: np.ndarray | None, about: ColumnMap, second: Second | None) -> np.ndarray | None:
+def _own_time(time: np.ndarray | None, about: ColumnMap, second: SecondFile | None) -> np.ndarray | None:
     if not about.second or second is None:
         return time
     return second.time if time is None else second.alignment.to_first(time)
 
 
 def _on_one_time(
-    table: Table, mapping: LogMap, parts: dict[str, _Part], second: Second | None, findings: list[Finding]
+    table: Table, mapping: LogMap, parts: dict[str, _Part], second: SecondFile | None, findings: list[Finding]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """All quantities at the times of the first file's rows; of a bus log, at those of the position."""
     grid = column_time(table, mapping.time)
@@ -216,7 +216,7 @@ def _on_one_time(
     return grid_in, arrays
 
 
-def _check_order(name: str, time: np.ndarray, of_second: bool, table: Table, second: Second | None) -> None:
+def _check_order(name: str, time: np.ndarray, of_second: bool, table: Table, second: SecondFile | None) -> None:
     """InputError for times (s) that are not the rows' own, and cannot be looked up in: none, blank, or going back."""
     where = str(second.table.path if of_second and second is not None else table.path)
     if len(time) == 0:
@@ -331,7 +331,7 @@ def _gain(table: Table, about: AxisMap) -> float | None:
 
 
 def _clocks(
-    table: Table, mapping: LogMap, parts: dict[str, _Part], second: Second | None, base: TimeBase
+    table: Table, mapping: LogMap, parts: dict[str, _Part], second: SecondFile | None, base: TimeBase
 ) -> tuple[Clock, ...]:
     """Where each quantity's times come from, and how sure they are where nobody says: a step of the stamps' digits."""
     where = mapping.time.source or (

@@ -114,9 +114,9 @@ def guessed(table: Table) -> LogMap:
 def logs_of(table: Table, mapping: LogMap) -> list[Log]:
     """The logs of each axis in the map, with findings."""
     from rds.identification.logs.axis_log import axis_logs
-    from rds.identification.logs.second_file import Second, read_second
+    from rds.identification.logs.second_file import SecondFile, read_second
 
-    second: Second | None = read_second(table, mapping) if mapping.second is not None else None
+    second: SecondFile | None = read_second(table, mapping) if mapping.second is not None else None
     try:
         return [log for axis in mapping.axes.values() for log in axis_logs(table, mapping, axis, second)]
     except InputError as error:

@@ -18,7 +18,7 @@ _POOR = 0.1  # of a sample period: an uncertainty of the offset beyond it is a w
 
 
 @dataclass(frozen=True)
-class Second:
+class SecondFile:
     """The second file's columns, its times on the first clock (s), and how well they are known."""
 
     table: Table
@@ -27,7 +27,7 @@ class Second:
     findings: tuple[Finding, ...]
 
 
-def read_second(first: Table, mapping: LogMap) -> Second:
+def read_second(first: Table, mapping: LogMap) -> SecondFile:
     """Read and align the file of `[second]`. InputError, at the map, where it cannot be done."""
     about = mapping.second
     assert about is not None
@@ -40,7 +40,7 @@ def read_second(first: Table, mapping: LogMap) -> Second:
         what = (
             f"second clock: offset {about.offset:g} s and drift {1e6 * (about.drift or 0.0):g} ppm, as the map states"
         )
-        return Second(table, alignment.to_first(time), alignment, (Finding("clock", what),))
+        return SecondFile(table, alignment.to_first(time), alignment, (Finding("clock", what),))
     assert about.first_column is not None and about.second_column is not None
     own = first.column(about.first_column, about.place)
     other = table.column(about.second_column, about.place)
@@ -65,7 +65,7 @@ def read_second(first: Table, mapping: LogMap) -> Second:
     if about.relation == "rate":
         what += ". The lag of the axis behind its command is part of the offset"
     findings = (Finding("clock", what, Gravity.WARNING if poor or about.relation == "rate" else Gravity.NOTE),)
-    return Second(table, alignment.to_first(time), alignment, findings)
+    return SecondFile(table, alignment.to_first(time), alignment, findings)
 
 
 def _clean(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -67,7 +67,7 @@ _OF_BUS = re.compile(
 )
 
 
-class Asked(NamedTuple):
+class ReadOptions(NamedTuple):
     """What a map says of a file beside its name, and who hears how far its reading has come."""
 
     delimiter: str | None = None
@@ -81,27 +81,27 @@ class DataFormat(NamedTuple):
 
     title: str
     endings: Sequence[str]
-    read: Callable[[Path, Asked], Table]
-    is_one: Callable[[Path, Asked], bool] | None = None
+    read: Callable[[Path, ReadOptions], Table]
+    is_one: Callable[[Path, ReadOptions], bool] | None = None
 
 
-def _late(module: str, name: str, *asks: str) -> Callable[[Path, Asked], Any]:
+def _late(module: str, name: str, *asks: str) -> Callable[[Path, ReadOptions], Any]:
     """The function `name(path)` of a module beside this one, imported on use; of what was asked it takes `asks`."""
 
-    def call(path: Path, asked: Asked) -> Any:
+    def call(path: Path, asked: ReadOptions) -> Any:
         function = getattr(import_module(f"rds.identification.logs.{module}"), name)
         return function(path, **{each: getattr(asked, each) for each in asks})
 
     return call
 
 
-def _is_of_frames(path: Path, asked: Asked) -> bool:
+def _is_of_frames(path: Path, asked: ReadOptions) -> bool:
     from rds.bus.tools.logs import is_of_frames
 
     return bool(asked.dbc) or is_of_frames(path)
 
 
-def _is_of_bus(path: Path, asked: Asked) -> bool:
+def _is_of_bus(path: Path, asked: ReadOptions) -> bool:
     """Whether a text is python-can's CSV, SavvyCAN's and GVRET's, or candump's by another name."""
     with open(path, "rb") as stream:
         return _OF_BUS.match(stream.read(60).removeprefix(codecs.BOM_UTF8)) is not None
@@ -111,7 +111,7 @@ _read_csv = _late("csv_table", "read_csv", "delimiter", "decimal", "progress")
 _read_can = _late("can_table", "read_can", "dbc", "progress")
 
 
-def _read_terminal(path: Path, asked: Asked) -> Table:
+def _read_terminal(path: Path, asked: ReadOptions) -> Table:
     """What a terminal has saved, which it calls .log as candump does."""
     try:
         table: Table = _read_csv(path, asked)
@@ -121,7 +121,7 @@ def _read_terminal(path: Path, asked: Asked) -> Table:
         raise InputError(f"{what}; nor is it a log of frames, as `candump -L` writes", error.where) from error
 
 
-def _without_measurements(path: Path, asked: Asked) -> Table:
+def _without_measurements(path: Path, asked: ReadOptions) -> Table:
     raise InputError("it is no MDF file with measurements; let the name of a bus log end in .mf4")
 
 
@@ -185,7 +185,7 @@ def read_table(
         raise InputError("it is a folder; name the file of data in it", str(path))
     if not path.is_file():
         raise InputError("there is no such file; check the name and the folder", str(path))
-    ending, asked = path.suffix.lower(), Asked(delimiter, decimal, dbc, progress)
+    ending, asked = path.suffix.lower(), ReadOptions(delimiter, decimal, dbc, progress)
     try:
         fitting = (each for each in FORMATS if ending in each.endings and (not each.is_one or each.is_one(path, asked)))
         found = next(fitting, None)

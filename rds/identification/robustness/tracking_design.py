@@ -59,7 +59,7 @@ class StepResponse:
 
 
 @dataclass(frozen=True)
-class Cloud:
+class LoopDraws:
     """The loop over draws of the axis: `margins` (draws, 4) as in `figures.MARGINS`, `poles` (draws, poles) in 1/s."""
 
     spread: Spread
@@ -138,14 +138,14 @@ class TrackingDesign:
         model = self.model if friction else library_model("linear-axis", tau=self.axis.tau, K=self.axis.K)
         return step_response(self.controller, model, self.T, samples, size)
 
-    def cloud(self, spread: Spread, number: int = 200, seed: int = 1) -> Cloud:
+    def cloud(self, spread: Spread, number: int = 200, seed: int = 1) -> LoopDraws:
         """Margins and poles over `number` draws of `spread`, whose parameters are those of the machine's own axis."""
         rows = draws(spread, seed, 0, number)
         models = [
             library_model("machine-axis", **dict(zip(spread.names, map(float, row), strict=True))) for row in rows
         ]
         margins = loop_margins(self.law, models, self.T)
-        return Cloud(spread, margins, continuous(closed_poles(self.law, models, self.T), self.T))
+        return LoopDraws(spread, margins, continuous(closed_poles(self.law, models, self.T), self.T))
 
 
 def tracking_design(

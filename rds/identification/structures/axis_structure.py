@@ -19,7 +19,7 @@ from rds.core.errors import InputError
 from rds.core.quantities import Quantity
 from rds.identification.logs.log import RATES, Log
 from rds.identification.structures.signals import POSITIONS, follow, followed
-from rds.identification.structures.structure import PLAY, Blocks, Idle, Start, Structure
+from rds.identification.structures.structure import PLAY, Blocks, HiddenParameter, Start, Structure
 
 OUTPUTS = ("mm", "deg", "mm/s", "rev/min")
 OPTIONS = ("viscous", "stribeck", "offset", "dead-zone", "delay", "backlash")
@@ -179,7 +179,7 @@ def _moved(
     return y, by
 
 
-def _idle(logs: Sequence[Log], begun: Mapping[str, float]) -> dict[str, Idle]:
+def _idle(logs: Sequence[Log], begun: Mapping[str, float]) -> dict[str, HiddenParameter]:
     """Friction of a direction in which no log moves by more than noise and the encoder's steps may do."""
     from rds.identification.fit.smoothing import motion_of
     from rds.identification.logs.motion import travel
@@ -199,7 +199,7 @@ def _idle(logs: Sequence[Log], begun: Mapping[str, float]) -> dict[str, Idle]:
             return -values[other], way * max(1.05 * abs(values["K"]) * peak, abs(values[other]))
 
         holding = 1e3 * max(fastest, abs(begun["K"]) * peak)
-        found[name] = Idle(way * holding, likely)
+        found[name] = HiddenParameter(way * holding, likely)
     return found
 
 

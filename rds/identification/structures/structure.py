@@ -33,7 +33,7 @@ class Response(Protocol):
 Start = tuple[dict[str, float], list[tuple[float, ...]]]  # values, and an initial state for each log
 
 
-class Idle(NamedTuple):
+class HiddenParameter(NamedTuple):
     """A parameter that logs hardly show: what is to be known to fit the others without it."""
 
     value: float  # at which it certainly shows nothing
@@ -89,7 +89,7 @@ class Structure:
     default_method: str = SIMULATION_ERROR  # the method where the user names none
     # parameters that these logs have little occasion to tell (friction of a direction in which the axis hardly moves),
     # given values to begin with
-    idle: Callable[[Sequence[Log], Mapping[str, float]], Mapping[str, Idle]] | None = None
+    idle: Callable[[Sequence[Log], Mapping[str, float]], Mapping[str, HiddenParameter]] | None = None
     neutral: Mapping[str, float] = field(default_factory=dict)  # values at which what options add has no effect
     # the same structure in a form that answers these logs sooner, as exactly as their noise asks
     prepare: Callable[[Sequence[Log]], Structure] | None = None

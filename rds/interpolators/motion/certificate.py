@@ -17,7 +17,7 @@ from rds.interpolators.motion.segments import AXES
 
 if TYPE_CHECKING:
     from rds.interpolators.motion.least_time import LeastTime
-    from rds.interpolators.motion.limiting import Explained
+    from rds.interpolators.motion.limiting import LimitingCauses
 
 KINDS = ("velocity", "acceleration", "jerk")
 EXCESS = 1e-6  # by which a limit may be exceeded, relative
@@ -257,7 +257,7 @@ class Certificate:
         found = [(worst.share, axis, worst.line) for (what, axis), worst in self.worst.items() if what == kind]
         return max(found, default=(0.0, "none", 0))
 
-    def plot(self, path: Any = None, explained: Explained | None = None) -> Any:
+    def plot(self, path: Any = None, explained: LimitingCauses | None = None) -> Any:
         """The matplotlib figure of the shares of the limits over time, with `explained` (limiting.py) also of the
         speeds along the path and what holds them back; saved at `path` if given.
         """

@@ -10,11 +10,11 @@ from rds.interpolators.motion.segments import AXES
 
 if TYPE_CHECKING:
     from rds.interpolators.motion.certificate import Certificate
-    from rds.interpolators.motion.limiting import Explained
+    from rds.interpolators.motion.limiting import LimitingCauses
 
 
 def plot_certificate(
-    certificate: Certificate, path: str | Path | None = None, explained: Explained | None = None
+    certificate: Certificate, path: str | Path | None = None, explained: LimitingCauses | None = None
 ) -> Any:
     """Largest velocity, acceleration and jerk of each axis in % of its limit, and the deviation from the path, over
     time. Above them, with `explained`, the speeds along the path, what holds them back, and what would save a second.

@@ -43,7 +43,7 @@ from rds.interpolators.motion.samples import SampleBlock
 from rds.interpolators.motion.segments import LINE, in_plane
 
 
-class Along(NamedTuple):
+class MoveSamples(NamedTuple):
     """Samples along one move, from its start on: way (mm, degrees), its first and second derivative by time."""
 
     way: np.ndarray
@@ -52,7 +52,7 @@ class Along(NamedTuple):
 
 
 # way, and the highest speed, acceleration and jerk along it -> samples T s apart, the last at rest on the end
-Law = Callable[[float, float, float, float], Along]
+Law = Callable[[float, float, float, float], MoveSamples]
 
 
 def each_move(
@@ -106,7 +106,7 @@ def _along(segment: np.ndarray, within: Limits, tau: float) -> tuple[np.ndarray,
         return f, u, cap, push, float((left / slope[moving]).min())
 
 
-def _samples(f: np.ndarray, u: np.ndarray, along: Along) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _samples(f: np.ndarray, u: np.ndarray, along: MoveSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Position, velocity and acceleration of the axes."""
     count = len(along.way)
     position, velocity, acceleration = (np.empty((count, 6)) for _ in range(3))
@@ -121,9 +121,9 @@ def trapezoid_law(T: float) -> Law:
     """Constant acceleration, constant speed, constant deceleration."""
     from rds.interpolators.motion.trapezoid import trapezoid
 
-    def law(way: float, speed: float, push: float, jerk: float) -> Along:
+    def law(way: float, speed: float, push: float, jerk: float) -> MoveSamples:
         found = trapezoid(way, speed, push, T)
-        return Along(found.position[1:], found.velocity[1:], found.acceleration[1:])
+        return MoveSamples(found.position[1:], found.velocity[1:], found.acceleration[1:])
 
     return law
 
@@ -132,8 +132,8 @@ def point_to_point_law(T: float) -> Law:
     """Within speed, acceleration and jerk, in the least time, by ruckig. RdsError where that is not installed."""
     from rds.interpolators.motion.point_to_point import point_to_point
 
-    def law(way: float, speed: float, push: float, jerk: float) -> Along:
+    def law(way: float, speed: float, push: float, jerk: float) -> MoveSamples:
         found = point_to_point((0.0,), (way,), (speed,), (push,), (jerk,), T)
-        return Along(found.position[1:, 0], found.velocity[1:, 0], found.acceleration[1:, 0])
+        return MoveSamples(found.position[1:, 0], found.velocity[1:, 0], found.acceleration[1:, 0])
 
     return law

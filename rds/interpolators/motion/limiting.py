@@ -183,7 +183,7 @@ def to_save(
     return high
 
 
-class Explained(NamedTuple):
+class LimitingCauses(NamedTuple):
     """What holds a motion back, and a row for each cause: `cause`, `seconds`, `lines`, and of some limits what is
     `limit`, `unit` and `to_save_a_second` (None where no more of it ever does).
     """
@@ -218,7 +218,7 @@ def explained(
     T: float,
     looked_for: int = ASKED,
     progress: Progress = lambda done, of: None,
-) -> Explained:
+) -> LimitingCauses:
     """What holds the motion of blocks of segments back, as `plan` takes them.
 
     Of the limits that do so for longest, `looked_for` at most, what each would have to be to save a second, up to the
@@ -247,4 +247,4 @@ def explained(
                 "unit": ("mm" if axis in AXES[:3] else "degrees") + PER[KINDS.index(kind)],
             }
         rows.append(row)
-    return Explained(found, rows)
+    return LimitingCauses(found, rows)

@@ -26,7 +26,7 @@ from rds.modes.process.machine import BUILTIN
 from rds.results import Result
 
 if TYPE_CHECKING:
-    from rds.bus.modules.oacs.events import Happened
+    from rds.bus.modules.oacs.events import ModuleEvent
     from rds.bus.modules.oacs.offers import Offer, Offers
     from rds.machines import Machine
 
@@ -36,7 +36,7 @@ _LOOK = 0.005  # s
 
 
 @dataclass(frozen=True)
-class Hands:
+class ExchangeCalls:
     """What somebody does and hears: `accept(offer)` says yes or no to a machine that the run can go on with.
 
     `refuse(offer, why)` hears of one that it cannot, `tell` of everything that happens, each with its time.
@@ -44,13 +44,13 @@ class Hands:
 
     accept: Callable[[Offer], bool]
     refuse: Callable[[Offer, str], None] = lambda offer, why: None
-    tell: Callable[[Happened], None] = lambda happened: None
+    tell: Callable[[ModuleEvent], None] = lambda happened: None
 
 
 def run_through_exchanges(
     experiment: Experiment,
     file: str | Path,
-    hands: Hands,
+    hands: ExchangeCalls,
     mode: str | None = None,
     out: str | Path | None = None,
     go: Callable[[Any, Any], Result] = lambda experiment, run: run.wait(),
@@ -99,7 +99,7 @@ def run_through_exchanges(
 
 
 def _accepted(
-    offers: Offers, experiment: Experiment, file: Path, channel: str | None, mode: str | None, hands: Hands
+    offers: Offers, experiment: Experiment, file: Path, channel: str | None, mode: str | None, hands: ExchangeCalls
 ) -> Experiment | None:
     """The experiment on the machine that was accepted; None where the modules have not changed, or nobody wants it."""
     ends: float | None = time.monotonic() + SETTLES
@@ -128,7 +128,7 @@ def _accepted(
     return None
 
 
-def _changed(happened: list[Happened]) -> bool:
+def _changed(happened: list[ModuleEvent]) -> bool:
     return any(each.event in ("added", "removed") for each in happened)
 
 
@@ -147,7 +147,7 @@ def _obstacle(
     return None
 
 
-def _tell_motion(run: Run, offers: Offers, hands: Hands) -> None:
+def _tell_motion(run: Run, offers: Offers, hands: ExchangeCalls) -> None:
     """Tell of the first sample of a run, at which the axes are driven again."""
     while not run.done:
         if run.progress[0]:

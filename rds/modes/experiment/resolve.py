@@ -29,7 +29,7 @@ from rds.modes.experiment.drives import (
 from rds.modes.experiment.experiment_file import AXIS_KEYS, PATHS, is_path
 from rds.modes.experiment.parts import Setting, make_controller, make_drive, make_model, named
 from rds.modes.loop.commands import Command
-from rds.modes.loop.following_error import Allowed
+from rds.modes.loop.following_error import ErrorLimits
 from rds.modes.loop.laws import ReferenceSamples
 from rds.modes.loop.mode import Mode
 from rds.modes.loop.plan import AxisPlan, Plan
@@ -290,7 +290,7 @@ def _compensated(table: TomlTable, setting: Setting, controller: Controller | No
     return compensated(controller, setting.T, time, most, axis, setting.command)
 
 
-def _following_error(words: TomlTable, setting: Setting, driven: str) -> Allowed | None:
+def _following_error(words: TomlTable, setting: Setting, driven: str) -> ErrorLimits | None:
     """How far the axis may be from its reference; a spindle, whose speed rises as it can, is not watched."""
     if (table := words.inner("following_error")) is None:
         return None
@@ -305,7 +305,7 @@ def _following_error(words: TomlTable, setting: Setting, driven: str) -> Allowed
         _refuse_own(table, setting.axis, "is for position axes")
         return None
     limits = setting.axis.limits
-    return Allowed(at_rest, ferror, setting.top_speed if limits is None else limits.velocity)
+    return ErrorLimits(at_rest, ferror, setting.top_speed if limits is None else limits.velocity)
 
 
 def _refuse_own(table: TomlTable, axis: Axis, why: str) -> None:

@@ -16,7 +16,7 @@ from rds.core.errors import InputError
 from rds.core.types import Controller, Reference, Source
 from rds.modes import DEFAULT, load_mode
 from rds.modes.experiment.experiment import Experiment
-from rds.modes.loop.asked import PATIENCE, CallerControl, answer, question
+from rds.modes.loop.caller_control import PATIENCE, CallerControl, answer, question
 from rds.results import Result
 
 _POLL = 0.05  # s

@@ -26,7 +26,7 @@ FOLLOWING_ERROR = Table(
 
 
 @dataclass(frozen=True)
-class Allowed:
+class ErrorLimits:
     """How far an axis may be from its reference, in its unit: at rest, and at its largest velocity (unit/s)."""
 
     at_rest: float
@@ -44,7 +44,7 @@ class Watched:
 
     name: str
     unit: str
-    allowed: Allowed
+    allowed: ErrorLimits
     place: int
 
 

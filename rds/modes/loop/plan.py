@@ -20,7 +20,7 @@ from rds.machines.converter import converter
 from rds.modes.loop.changes import LiveChanges, plan_changes, stop_channel
 from rds.modes.loop.commands import Command, limiter
 from rds.modes.loop.execution import Execution, Follower
-from rds.modes.loop.following_error import Allowed, FollowingGuard, Watched
+from rds.modes.loop.following_error import ErrorLimits, FollowingGuard, Watched
 from rds.modes.loop.force_guard import Cell
 from rds.modes.loop.interpolated import Interpolated
 from rds.modes.loop.laws import LiveReference, ReferenceSamples, controlled, coupled, played
@@ -48,7 +48,7 @@ class AxisPlan:
     signal: Sequence[float] | None = None  # V at every sample
     command: Command = Command.VOLTAGE
     most_target: float = inf  # in the command's unit
-    following_error: Allowed | None = None
+    following_error: ErrorLimits | None = None
 
     @property
     def acting(self) -> str:

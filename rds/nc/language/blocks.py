@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rds.nc.language.expressions import Fault, whole
-from rds.nc.language.outside import EXTRUDER, FANUC_CONTOUR, LOOK_AHEAD, REPEATS, no_such_g, no_such_m
 from rds.nc.language.state import NO_MOTION, XY, State
+from rds.nc.language.unknown_words import EXTRUDER, FANUC_CONTOUR, LOOK_AHEAD, REPEATS, no_such_g, no_such_m
 
 AXES = "xyzabc"
 AXIS_SET = frozenset((*AXES, "@", "^"))  # @ and ^: radius and angle of a polar end

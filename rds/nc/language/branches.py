@@ -14,7 +14,7 @@ from rds.nc.language.expressions import Fault
 from rds.nc.language.owords import Word
 from rds.nc.language.parameters import Parameters
 from rds.nc.language.saved_modes import SavedModes
-from rds.nc.language.source import Place, Source
+from rds.nc.language.source import Source, SourcePosition
 
 
 class Label(NamedTuple):
@@ -22,7 +22,7 @@ class Label(NamedTuple):
 
     kind: str
     source: Source
-    place: Place
+    place: SourcePosition
 
 
 class Frame:
@@ -33,7 +33,7 @@ class Frame:
 
     __slots__ = ("kept", "more", "name", "place", "repeats", "saved", "source")
 
-    def __init__(self, name: str, source: Source, place: Place, kept: list[float] | None, more: int = 0):
+    def __init__(self, name: str, source: Source, place: SourcePosition, kept: list[float] | None, more: int = 0):
         self.name = name
         self.source = source
         self.place = place

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rds.nc.language.context import Context
     from rds.nc.language.control import Control
     from rds.nc.language.repeated_lines import Line, RepeatedLines
-    from rds.nc.language.source import Place
+    from rds.nc.language.source import SourcePosition
 
 _OFTEN = (6, 60, 600)  # rounds or calls after which it is tried, in vain perhaps, as not all has been executed
 _MOST = 400  # lines of a loop or subroutine
@@ -114,7 +114,7 @@ class _Function:
         absolute: bool,
     ):
         self.absolute = absolute
-        self.places: list[Place] = []
+        self.places: list[SourcePosition] = []
         self.labels: list[Label] = []
         self.words: list[Word] = []
         self.calls = calls
@@ -146,12 +146,12 @@ class _Function:
                 raise _Refused
         self._put(f"return places[{len(self.places)}]")
         self.places.append(source.following())
-        self.run: Callable[..., Place | None] = lines.compiled(_HEAD + "\n".join(self._code) + _TAIL)
+        self.run: Callable[..., SourcePosition | None] = lines.compiled(_HEAD + "\n".join(self._code) + _TAIL)
 
     def _put(self, *lines: str) -> None:
         self._code += [" " * (2 + len(self._open)) + line for line in lines]
 
-    def _subroutine(self, line: Line, kind: str, name: str, behind: Place) -> None:
+    def _subroutine(self, line: Line, kind: str, name: str, behind: SourcePosition) -> None:
         """SUB, which the function begins with, ENDSUB and RETURN, which leave it, and CALL."""
         k, label = len(self.places) - 1, self._control.label_of(name)
         if kind == "call":

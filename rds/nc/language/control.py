@@ -20,7 +20,7 @@ from rds.nc.language.owords import FANUC, Word, nested, read_fanuc, read_gr, rea
 from rds.nc.language.parameters import Parameters
 from rds.nc.language.repeated_lines import Line, RepeatedLines
 from rds.nc.language.saved_modes import SavedModes
-from rds.nc.language.source import Place, Source, open_file
+from rds.nc.language.source import Source, SourcePosition, open_file
 from rds.nc.language.words import column_of, line_number, recoded, tidy
 
 _ENDS = {"sub": "ENDSUB", "if": "ENDIF", "while": "ENDWHILE", "do": "WHILE [...]", "repeat": "ENDREPEAT"}
@@ -175,7 +175,7 @@ class Control(Branches):
         """How many calls inside one another there may be."""
         return self._dialect.max_depth
 
-    def enters(self, name: str, label: Label, arguments: list[float], behind: Place) -> bool:
+    def enters(self, name: str, label: Label, arguments: list[float], behind: SourcePosition) -> bool:
         """Call a subroutine, to come back to `behind`; False, and nothing done, where there is more to it."""
         if len(self._frames) >= self._dialect.max_depth or not self.jumps_unseen(label):
             return False

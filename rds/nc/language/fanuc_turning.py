@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 from rds.nc.language.blocks import MOTION, Block
 from rds.nc.language.canon import TRAVERSE
 from rds.nc.language.expressions import Fault
-from rds.nc.language.source import Place, Source
+from rds.nc.language.source import Source, SourcePosition
 from rds.nc.language.turning_contour import Piece, Point
 from rds.nc.language.words import line_number, tidy
 
@@ -49,7 +49,7 @@ class _Contour:
     last: int
     left: Point
     along_x: bool = False  # roughed by G72
-    place: Place | None = None
+    place: SourcePosition | None = None
     file: str = ""
 
     @property
@@ -197,7 +197,7 @@ def _check_once(pairs: list[tuple[str, str]]) -> None:
             raise Fault(f"the word {letter.upper()} stands twice on the line; write it once", letter)
 
 
-def _first(source: Source, number: int) -> Place:
+def _first(source: Source, number: int) -> SourcePosition:
     """Where the block N of this number begins: the next but for blank lines and comments. Raises Fault."""
     while raw := source.read():
         text = _COMMENT.sub("", tidy(raw))

@@ -9,8 +9,8 @@ from rds.nc.language.blocks import AXES
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
-from rds.nc.language.outside import OLD_LINE_ENDS, other_language
 from rds.nc.language.source import Source
+from rds.nc.language.unknown_words import OLD_LINE_ENDS, other_language
 from rds.nc.language.words import column_of, place_of, recoded, word_at
 
 _SCRIPT = re.compile(r"(?:n[0-9]+)?(rf[0-9]|build)")

@@ -43,13 +43,13 @@ from rds.nc.language.offsets import (
     set_units,
     tell_tool,
 )
-from rds.nc.language.outside import active_comment
 from rds.nc.language.parameters import DEBUG_SHOWN
 from rds.nc.language.program_end import stop
 from rds.nc.language.signals import signal
 from rds.nc.language.splines import draw_points
 from rds.nc.language.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION, PLANES
 from rds.nc.language.tool_centre import check_words
+from rds.nc.language.unknown_words import active_comment
 
 _ACTIVE_COMMENTS = ("pyrun,", "py,", "abort,")
 _ACTIVE_ALONE = ("pyreload",)

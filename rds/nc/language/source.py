@@ -23,7 +23,7 @@ _NO_PROGRAMS = {  # by the file's ending
 _WINDOW = LONGEST + 4  # a block with `;` and a line break, and one character more
 
 
-class Place(NamedTuple):
+class SourcePosition(NamedTuple):
     """Where a block begins: bytes from the file's start, line (from 1), characters before it on its line."""
 
     offset: int
@@ -55,16 +55,16 @@ class Source:
         self.folder = folder
         self.line = 0  # of the block read last
         self.column = 0  # characters before that block on its line
-        self.place = Place(0, 1, 0)  # of the block read last
+        self.place = SourcePosition(0, 1, 0)  # of the block read last
         self.buffer = b""
         self.at = 0
         self._stream = stream
         self._base = stream.tell()  # of the buffer's first byte
-        self._next = Place(self._base, 1, 0)
+        self._next = SourcePosition(self._base, 1, 0)
         self._semicolons = semicolons
         self._ended = False
         self._fresh = True  # nothing has been read
-        self._known: dict[int, tuple[bytes, Place]] = {}  # by their place: blocks read again, and what follows them
+        self._known: dict[int, tuple[bytes, SourcePosition]] = {}  # blocks read again, and what follows
 
     def size(self) -> int:
         """Bytes of the whole program; 0 when that is not known before it is read."""
@@ -99,7 +99,7 @@ class Source:
         if text.startswith(codecs.BOM_UTF8):
             text = text[len(codecs.BOM_UTF8) :]
             self._base += len(codecs.BOM_UTF8)
-            self._next = Place(self._base, 1, 0)
+            self._next = SourcePosition(self._base, 1, 0)
         return text
 
     def read_again(self) -> bytes:
@@ -131,9 +131,9 @@ class Source:
         self.line, self.column = place.line, place.column
         self.at += len(raw)
         if raw[-1] == 10:
-            self._next = Place(place.offset + len(raw), place.line + 1, 0)
+            self._next = SourcePosition(place.offset + len(raw), place.line + 1, 0)
         else:
-            self._next = Place(place.offset + len(raw), place.line, place.column + len(raw))
+            self._next = SourcePosition(place.offset + len(raw), place.line, place.column + len(raw))
         return raw
 
     def _short_block(self) -> bytes:
@@ -148,7 +148,7 @@ class Source:
         """`size` bytes of the buffer, which are `lines` whole lines, have been taken by someone else."""
         self.at += size
         offset, line, _ = self._next
-        self._next = Place(offset + size, line + lines, 0)
+        self._next = SourcePosition(offset + size, line + lines, 0)
         self.line = line + lines - 1
 
     @property
@@ -156,11 +156,11 @@ class Source:
         """The line of the block that comes next."""
         return self._next.line
 
-    def following(self) -> Place:
+    def following(self) -> SourcePosition:
         """Where the next block begins."""
         return self._next
 
-    def go_to(self, place: Place) -> None:
+    def go_to(self, place: SourcePosition) -> None:
         """Read on from there."""
         inside = place.offset - self._base
         if 0 <= inside <= len(self.buffer):

@@ -6,8 +6,8 @@ import re
 
 from rds.nc.language.blocks import Block
 from rds.nc.language.expressions import FUNCTION, Fault, Reader
-from rds.nc.language.outside import GR_IS_OFF, no_such_letter
 from rds.nc.language.parameters import Parameters
+from rds.nc.language.unknown_words import GR_IS_OFF, no_such_letter
 
 _BLANKS = b" \t\r"
 _LOWER = bytes.maketrans(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ", b"abcdefghijklmnopqrstuvwxyz")

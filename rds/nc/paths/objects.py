@@ -36,7 +36,7 @@ class File:
 
 
 @dataclass(frozen=True)
-class Made:
+class MadePath:
     """A path, what it is in a few words, and what there is to say of it besides."""
 
     segments: Sequence[Segment]
@@ -63,11 +63,11 @@ def line(
     start: Annotated[str, Numbers("start x,y or x,y,z in mm (z is 0 unless given)", POINT, (2, 3))],
     end: Annotated[str, Numbers("end x,y or x,y,z in mm (z is 0 unless given)", POINT, (2, 3))],
     feed: Annotated[float, FEED],
-) -> Made:
+) -> MadePath:
     """A straight cut between two points in space, all axes starting and ending together."""
     from rds.nc.paths.lines import line as make
 
-    return Made(make(numbers(start, "start"), numbers(end, "end"), feed / 60), f"line from {start} to {end} mm")
+    return MadePath(make(numbers(start, "start"), numbers(end, "end"), feed / 60), f"line from {start} to {end} mm")
 
 
 def quad(
@@ -82,7 +82,7 @@ def quad(
             "a side: direction (degrees), length (mm), change in z (mm, 0 unless given); three of them", SIDE, (2, 3)
         ),
     ] = None,
-) -> Made:
+) -> MadePath:
     """A quadrilateral, closed: by four corners, or by one corner and three sides (the fourth leads back)."""
     from rds.nc.paths.lines import quadrilateral, quadrilateral_by_moves
 
@@ -90,12 +90,12 @@ def quad(
         raise InputError("quad: give --corner four times, or --start and --move three times")
     if corner:
         corners = [numbers(text, "corner") for text in corner]
-        return Made(quadrilateral(corners, feed / 60), f"quadrilateral {' '.join(corner)} mm")
+        return MadePath(quadrilateral(corners, feed / 60), f"quadrilateral {' '.join(corner)} mm")
     if start is None:
         raise InputError("quad: --move needs a corner to begin at; give --start")
     moves: Any = [numbers(text, "move") for text in move or []]
     segments = quadrilateral_by_moves(numbers(start, "start"), moves, feed / 60)
-    return Made(segments, f"quadrilateral from {start} mm by {' '.join(move or [])} (degrees, mm, mm)")
+    return MadePath(segments, f"quadrilateral from {start} mm by {' '.join(move or [])} (degrees, mm, mm)")
 
 
 def arc(
@@ -106,7 +106,7 @@ def arc(
     feed: Annotated[float, FEED],
     depth: Annotated[float, DEPTH] = 0.0,
     end_depth: Annotated[float | None, Quantity("depth at the end, with which the arc becomes a helix", "mm")] = None,
-) -> Made:
+) -> MadePath:
     """An arc, a circle or a helix by centre, radius, start angle and sweep."""
     from rds.nc.paths.arcs import arc as make
 
@@ -114,7 +114,7 @@ def arc(
     segments = make(middle, radius, start_angle, sweep, feed / 60, depth=depth, end_depth=end_depth)
     helix = "" if end_depth is None else f" to {end_depth:g} mm"
     said = f"arc about {centre} mm, radius {radius:g} mm, {sweep:g}° from {start_angle:g}°, depth {depth:g} mm{helix}"
-    return Made(segments, said)
+    return MadePath(segments, said)
 
 
 def cone(
@@ -131,7 +131,7 @@ def cone(
         float | None,
         Quantity("largest distance of a chord from the spiral, instead of the step angle", "mm", above=0.0),
     ] = None,
-) -> Made:
+) -> MadePath:
     """A spiral cone: a circle at the bottom, then a spiral up and inwards to z = 0."""
     from rds.nc.paths.cone import chord_angle, chord_error, spiral_cone
 
@@ -140,7 +140,7 @@ def cone(
     error = chord_error(radius, step_width, chord_angle(radius, step_width, **options))
     said = f"spiral cone about {centre} mm, radius {radius:g} mm, height {height:g} mm, "
     said += f"step height {step_height:g} mm, step width {step_width:g} mm"
-    return Made(segments, said, {"deviation_mm": error, "tolerance_mm": tolerance})
+    return MadePath(segments, said, {"deviation_mm": error, "tolerance_mm": tolerance})
 
 
 def points(
@@ -155,7 +155,7 @@ def points(
     tolerance: Annotated[
         float | None, Quantity("fit arcs and longer lines that keep within this distance", "mm", above=0.0)
     ] = None,
-) -> Made:
+) -> MadePath:
     """A path through the points of a file, in lines, or with a tolerance in arcs and lines."""
     from rds.nc.paths.points import path_of_points, read_points
 
@@ -163,10 +163,10 @@ def points(
     segments, deviation = path_of_points(read, feed / 60, depth=depth, closed=close, tolerance=tolerance)
     more: dict[str, Any] = {"points": sum(map(len, read.pieces)), "repeated_points_left_out": read.repeated}
     more |= {} if tolerance is None else {"deviation_mm": deviation, "tolerance_mm": tolerance}
-    return Made(segments, f"points of {file.name}", more, source=file)
+    return MadePath(segments, f"points of {file.name}", more, source=file)
 
 
-OBJECTS: dict[str, Callable[..., Made]] = {"line": line, "quad": quad, "arc": arc, "cone": cone, "points": points}
+OBJECTS: dict[str, Callable[..., MadePath]] = {"line": line, "quad": quad, "arc": arc, "cone": cone, "points": points}
 
 
 def numbers(text: str, name: str) -> list[float]:

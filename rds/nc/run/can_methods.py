@@ -20,8 +20,8 @@ import numpy as np
 
 from rds.bus.hub.command import Command
 from rds.bus.medium.bits import longest
-from rds.bus.modules.course import Course
 from rds.bus.modules.drift import drift_by_axis, drifts
+from rds.bus.modules.motion_course import MotionCourse
 from rds.bus.modules.rds import frames, motion_frames
 from rds.bus.modules.rds.module import AxisModule
 from rds.bus.modules.rds.motion_frames import FINE, Buffer
@@ -185,7 +185,7 @@ def _bus(
 
 def _carry_out(
     method: str, host: MotionHost, motion: SerialMotion, machine: Machine, dry: bool = False
-) -> tuple[Course, int, int]:
+) -> tuple[MotionCourse, int, int]:
     """The course, and bits and bytes that went over the bus meanwhile."""
     try:
         return _carried_out(method, host, motion, machine, dry)
@@ -199,7 +199,7 @@ def _carry_out(
 
 def _carried_out(
     method: str, host: MotionHost, motion: SerialMotion, machine: Machine, dry: bool
-) -> tuple[Course, int, int]:
+) -> tuple[MotionCourse, int, int]:
     period, nodes = motion.period, motion.units
     host.port.send(frames.SETUP, frames.encode_setup(period))
     if not dry:
@@ -267,7 +267,7 @@ def _approach(host: MotionHost, motion: SerialMotion, machine: Machine) -> None:
 def _measured(
     method: str,
     motion: SerialMotion,
-    course: Course,
+    course: MotionCourse,
     rows: Mapping[str, np.ndarray],
     sent: int,
     busy: float,
@@ -298,6 +298,6 @@ def _measured(
     )
 
 
-def _at(time: np.ndarray, rows: np.ndarray, course: Course) -> np.ndarray:
+def _at(time: np.ndarray, rows: np.ndarray, course: MotionCourse) -> np.ndarray:
     """What a gauge showed at these instants since the motion began; `rows` are instants and readings."""
     return np.interp(time, rows[:, 0] - course.begun, rows[:, 1])

@@ -57,7 +57,7 @@ _NOTE = (
 
 
 @dataclass(frozen=True)
-class Compared:
+class MethodComparison:
     """The numbers of one method, in the order of `COLUMNS`, or why it was refused."""
 
     name: str
@@ -76,7 +76,7 @@ def compare_methods(
     as_built: bool = True,
     setup: Setup | Mapping[str, Any] | None = None,
     progress: Progress | None = None,
-) -> list[Compared]:
+) -> list[MethodComparison]:
     """Every method of the library, and the users' files `own`, along the path (or part program) in `file`, simulated.
 
     The axes are those behind the bus, with friction, play and the loop's sample of delay; without `as_built`, the
@@ -112,11 +112,11 @@ def compare_methods(
         except (ContractError, InputError) as error:  # before the run, or at the segment that it does not take
             if name not in LIBRARY.modules or name == LIBRARY.names()[0]:  # which takes every path
                 raise
-            found.append(Compared(name, refused=str(error)))
+            found.append(MethodComparison(name, refused=str(error)))
             continue
         program = experiment.plan().program
         assert isinstance(program, InterpolatedProgram)
-        found.append(Compared(Path(name).name, _numbers(result, program, result.meta["sample_period"])))
+        found.append(MethodComparison(Path(name).name, _numbers(result, program, result.meta["sample_period"])))
     if progress is not None:
         progress(len(names), len(names))
     return found
@@ -193,7 +193,7 @@ def _times(program: InterpolatedProgram) -> list[float]:
     return took or [0.0]
 
 
-def methods_report(compared: Sequence[Compared], file: Path, settings: Mapping[str, Any]) -> Report:
+def methods_report(compared: Sequence[MethodComparison], file: Path, settings: Mapping[str, Any]) -> Report:
     """The comparison as a table, one picture and sentences."""
     taken = [each for each in compared if each.numbers]
     rows = [(each.name, *each.numbers) for each in taken]

@@ -23,8 +23,8 @@ from rds.bus.modules.oacs.codes import Kind, MessageToHost, Select
 from rds.bus.modules.oacs.messages import Decoded
 from rds.bus.modules.oacs.module import OacsModule
 from rds.bus.modules.oacs.module_data import ModuleData, read_modules
+from rds.bus.modules.oacs.module_group import BusPort, ModuleGroup, Port, VirtualPort
 from rds.bus.modules.oacs.pid import Tuning
-from rds.bus.modules.oacs.several import BusPort, Port, Several, VirtualPort
 from rds.bus.tools.link import BUILTIN, open_bus
 from rds.core.errors import InputError, MachineError
 from rds.core.progress import Progress
@@ -131,7 +131,7 @@ def run_moves(
             gauges = {name: module.plant for name, module in virtual.items()}
         else:
             port, gauges = _bus(machine, channel, interface, bitrate, stack), {}
-        host = Several(port, {data.node: f"{name} (module {data.node})" for name, data in modules.items()})
+        host = ModuleGroup(port, {data.node: f"{name} (module {data.node})" for name, data in modules.items()})
         if chosen is not None:
             if mode != SIMULATION and not _starts_modules(channel, interface):
                 raise InputError(
@@ -164,7 +164,7 @@ def check_mode(mode: str) -> None:
         raise InputError(f"method {METHOD} runs in {' and '.join(MODES)}: a move command has no dry run; not in {mode}")
 
 
-def require_start(host: Several, modules: Mapping[str, ModuleData], start: Mapping[str, float]) -> None:
+def require_start(host: ModuleGroup, modules: Mapping[str, ModuleData], start: Mapping[str, float]) -> None:
     """MachineError, before anything moves, where an axis stands off the place from which the program takes it.
 
     All axes are asked, not only those that the program moves: a line that sends an axis to where it is thought to be
@@ -193,7 +193,9 @@ def require_start(host: Several, modules: Mapping[str, ModuleData], start: Mappi
 class _Carrier:
     """Carries lines out, one after the other, and keeps what came of them."""
 
-    def __init__(self, host: Several, machine: Machine, modules: Mapping[str, ModuleData], gauges: Mapping[str, Any]):
+    def __init__(
+        self, host: ModuleGroup, machine: Machine, modules: Mapping[str, ModuleData], gauges: Mapping[str, Any]
+    ):
         self._host, self._modules, self._gauges = host, modules, gauges
         self._by_number = {data.node: data for data in modules.values() if data.kind != Kind.TOOL}
         self._began = host.port.now()

@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 
 from rds.bus.hub.bus_settings import DEFAULT_BAUD
-from rds.bus.modules.course import Course
 from rds.bus.modules.dcs import dry_run
 from rds.bus.modules.dcs import methods as on_line
 from rds.bus.modules.dcs.buffers import bytes_of
@@ -30,6 +29,7 @@ from rds.bus.modules.dcs.commands import MOST_STEPS
 from rds.bus.modules.dcs.drivers import exchange_time
 from rds.bus.modules.dcs.host import Host
 from rds.bus.modules.dcs.port import SerialPort, VirtualPort, is_device
+from rds.bus.modules.motion_course import MotionCourse
 from rds.core.errors import InputError
 from rds.machines import Machine
 from rds.modes import EMULATION, SIMULATION, mode_names
@@ -52,7 +52,7 @@ class MethodRun:
 
     method: str
     motion: SerialMotion
-    course: Course
+    course: MotionCourse
     time: np.ndarray = field(default_factory=lambda: np.zeros(0))  # s since the motion began
     position: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # where the carriages were
     error: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the carriage from the path, feeds only
@@ -151,7 +151,7 @@ def _dry_run(
     baud: float,
     channel: str | None,
     line: Mapping[str, Any],
-) -> Course:
+) -> MotionCourse:
     """The same on a line in real time, on which nothing moves."""
     with ExitStack() as stack:
         where, trace = _line(machine, channel, baud, line, stack)
@@ -221,7 +221,7 @@ def _approach(host: Host, motion: SerialMotion) -> None:
         on_line.method_c(host, np.diff(places, axis=0), motion.units)
 
 
-def _carry_out(method: str, host: Host, motion: SerialMotion, machine: Machine) -> Course:
+def _carry_out(method: str, host: Host, motion: SerialMotion, machine: Machine) -> MotionCourse:
     pulses, names, units = motion.pulses, list(motion.axes), list(motion.units)
     nodes = dict(zip(units, motion.nodes, strict=True))
     if motion.spindle is not None:
@@ -253,7 +253,7 @@ def _astray(method: str, host: Host, motion: SerialMotion, machine: Machine) -> 
 def _measured(
     method: str,
     motion: SerialMotion,
-    course: Course,
+    course: MotionCourse,
     rows: np.ndarray,
     names: Sequence[str],
     traffic: tuple[int, float],
@@ -285,7 +285,7 @@ def _measured(
     )
 
 
-def segment_at(method: str, motion: SerialMotion, course: Course, time: np.ndarray) -> np.ndarray:
+def segment_at(method: str, motion: SerialMotion, course: MotionCourse, time: np.ndarray) -> np.ndarray:
     """Where on the path each instant belongs, as far as the method's clock tells."""
     if method.startswith("B"):
         steps = np.cumsum(motion.counts)

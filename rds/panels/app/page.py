@@ -17,7 +17,7 @@ def show() -> Any:
     import ipywidgets
 
     from rds.panels import main
-    from rds.panels.app.whereabouts import answer_asks
+    from rds.panels.app.kernel_stack import answer_asks
 
     ipywidgets.register_comm_target()  # it does so itself only where it is imported by a kernel that runs already
     if WHEREABOUTS in os.environ:

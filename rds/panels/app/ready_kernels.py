@@ -100,7 +100,7 @@ def main() -> None:
     if told is None:
         return
     end_with_parent()  # whatever a user's code holds; ipykernel looks now and then, in Python
-    from rds.panels.session.beside import begin_beside
+    from rds.panels.session.background_pictures import begin_beside
 
     begin_beside()
     if os.getppid() == parent:
@@ -109,7 +109,7 @@ def main() -> None:
 
 def _fork_for_each(channel: socket.socket) -> dict[str, Any] | None:
     """In each forked process what it was told, ready to be a kernel; None in this one, at the end of the channel."""
-    from rds.panels.session.beside import IDLE, import_for_pictures
+    from rds.panels.session.background_pictures import IDLE, import_for_pictures
 
     gc.freeze()  # what all kernels have: no kernel goes through it, and so has a copy of it
     with channel, channel.makefile("r", encoding="utf-8") as lines:

@@ -14,8 +14,8 @@ from jupyter_core.utils import ensure_async
 from jupyter_server.base.handlers import APIHandler
 from tornado import web
 
+from rds.panels.app.kernel_stack import ask
 from rds.panels.app.page import BUS, FOLDER, MACHINE, WHEREABOUTS
-from rds.panels.app.whereabouts import ask
 
 _MOST_CHANNELS = 64
 _KERNEL = r"/rds/kernel/([0-9a-f-]{36})"  # as Jupyter names them

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rds.identification.robustness.figures import MARGINS
-from rds.identification.robustness.tracking_design import Cloud, StepResponse, TrackingDesign
+from rds.identification.robustness.tracking_design import LoopDraws, StepResponse, TrackingDesign
 from rds.panels.design.splane import series
 from rds.results.html import notes_list, table
 
@@ -115,7 +115,7 @@ def _error(design: TrackingDesign) -> Mapping[str, Any]:
     }
 
 
-def key_numbers(design: TrackingDesign, size: float, cloud: Cloud | None) -> str:
+def key_numbers(design: TrackingDesign, size: float, cloud: LoopDraws | None) -> str:
     """What a student looks at while a pole moves, as HTML; beside the margins their worst over the cloud."""
     margins, step, worst = design.margins, design.step(size), cloud.worst if cloud is not None else {}
     rows = [
@@ -135,7 +135,7 @@ def key_numbers(design: TrackingDesign, size: float, cloud: Cloud | None) -> str
     return table(["", "now", "worst"], rows)
 
 
-def details(design: TrackingDesign, cloud: Cloud | None) -> str:
+def details(design: TrackingDesign, cloud: LoopDraws | None) -> str:
     """Poles, the observer's numbers, and what the design does not know of."""
     gains = design.gains
     rows = [["poles", f"{_shown(design)} 1/s"], ["observer pole", f"{design.observer_pole:.4g} 1/s"]]
@@ -151,7 +151,7 @@ def _shown(design: TrackingDesign) -> str:
     return ", ".join(f"{each.real:.4g}" for each in design.poles)
 
 
-def _notes(design: TrackingDesign, cloud: Cloud | None) -> list[str]:
+def _notes(design: TrackingDesign, cloud: LoopDraws | None) -> list[str]:
     said = [f"for {design.axis.name}: τ = {design.axis.tau:.4g} s, K = {design.axis.K:.4g} ({design.axis.unit}/s)/V"]
     if cloud is not None:
         count = len(cloud.margins)

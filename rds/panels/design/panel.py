@@ -9,7 +9,7 @@ import ipywidgets as widgets
 import numpy as np
 
 from rds.core.errors import InputError, RdsError
-from rds.identification.robustness.tracking_design import Cloud, TrackingDesign
+from rds.identification.robustness.tracking_design import LoopDraws, TrackingDesign
 from rds.panels.design.charts import charts, details, key_numbers
 from rds.panels.design.splane import Curves, SPlane
 from rds.panels.design.state import Design
@@ -53,8 +53,8 @@ class DesignView:
         self._side = widgets.VBox([])
         self._side.add_class("rds-side")
         self._made: TrackingDesign | None = None  # what is shown
-        self._cloud: Cloud | None = None
-        self._drawing: Task[Cloud] | None = None
+        self._cloud: LoopDraws | None = None
+        self._drawing: Task[LoopDraws] | None = None
         self._clouded: TrackingDesign | None = None  # what it is drawn for
         self._stale, self._undrawn, self._quiet = True, True, 0
         self._complains = False  # whether the notice is about the poles

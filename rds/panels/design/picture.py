@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from rds.core.figure import BLUE, GREY, VERMILLION, Picture, dress, legend
-from rds.identification.robustness.tracking_design import Cloud, TrackingDesign
+from rds.identification.robustness.tracking_design import LoopDraws, TrackingDesign
 from rds.panels.design.charts import ACCENT, ASIDE, QUIET, charts
 
 _COLORS = {ACCENT: BLUE, ASIDE: VERMILLION, QUIET: GREY}
 _COLUMNS = 3
 
 
-def design_picture(design: TrackingDesign, size: float, cloud: Cloud | None) -> Picture:
+def design_picture(design: TrackingDesign, size: float, cloud: LoopDraws | None) -> Picture:
     """Poles (1/s), with those of the loop over the cloud; then the charts for a step of `size` in the axis's unit."""
     shown = charts(design, size)
     rows = -(-(1 + len(shown)) // _COLUMNS)
@@ -36,7 +36,7 @@ def _reals(design: TrackingDesign) -> str:
     return ", ".join(f"{each.real:.4g}" for each in design.poles)
 
 
-def _plane(place: Any, design: TrackingDesign, cloud: Cloud | None) -> None:
+def _plane(place: Any, design: TrackingDesign, cloud: LoopDraws | None) -> None:
     if cloud is not None:
         drawn = cloud.poles.ravel()
         drawn = drawn[np.isfinite(drawn)]

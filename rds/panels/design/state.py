@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rds.core.types import Model
     from rds.identification.fit.design import Linear
     from rds.identification.robustness.draws import Spread
-    from rds.identification.robustness.tracking_design import Cloud, TrackingDesign
+    from rds.identification.robustness.tracking_design import LoopDraws, TrackingDesign
 
 DRAWS = 200  # of the cloud
 PANEL = "design"
@@ -141,7 +141,7 @@ class Design:
             ("tau", "K", "delay"), values, {"tau": "s", "K": "(mm/s)/V", "delay": "s"}, None, values - width, high
         )
 
-    def cloud(self, design: TrackingDesign) -> Task[Cloud]:
+    def cloud(self, design: TrackingDesign) -> Task[LoopDraws]:
         """Begin to look at `design` over what the axis may be."""
         spread = self.spread()
         return self.session.work("robustness", lambda task: design.cloud(spread, DRAWS))

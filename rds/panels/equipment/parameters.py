@@ -21,7 +21,7 @@ _MOST_UNDONE = 100
 _LIVE = "Parameters, live: Enter sends"
 
 
-class Folded:
+class FoldedFields:
     """Fields that most leave alone, folded away; the title says how many there are, and how many were changed."""
 
     def __init__(self, title: str):
@@ -42,7 +42,7 @@ class Folded:
             self.widget.titles = (title,)
 
 
-class Parameters(Folded):
+class Parameters(FoldedFields):
     """`lock()` when a run begins, `show_live(values)` where its values can be changed, `rest()` when it is over."""
 
     def __init__(self, equipment: Equipment):

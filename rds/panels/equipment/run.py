@@ -19,7 +19,7 @@ from rds.modes.experiment.report import save_run
 from rds.modes.experiment.run import Run
 from rds.modes.loop.plan import Plan
 from rds.modes.loop.program import HOLD, OVERRIDE
-from rds.panels.session.beside import made_beside
+from rds.panels.session.background_pictures import made_beside
 from rds.panels.session.run_table import keep_choices
 from rds.panels.session.saving import saving
 from rds.panels.session.session import RUNS, Session

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipywidgets as widgets
 
 from rds.panels.equipment.fields import FERROR, PREFIX, SIZES
-from rds.panels.equipment.parameters import Folded, Parameters, box_of_fields, count_changed, fill
+from rds.panels.equipment.parameters import FoldedFields, Parameters, box_of_fields, count_changed, fill
 from rds.panels.equipment.state import Equipment
 from rds.panels.interpolator.motion import MADE, OWN
 from rds.panels.kit.field import FieldView
@@ -28,7 +28,7 @@ class EquipmentSettings:
         self._equipment = equipment
         self._views: dict[str, FieldView] = {}
         self._groups = [box_of_fields() for _ in _GROUPS]
-        self.parameters, self._models = Parameters(equipment), Folded("Parameters of the model")
+        self.parameters, self._models = Parameters(equipment), FoldedFields("Parameters of the model")
         at = 1 + next(i for i, names in enumerate(_GROUPS) if "controller" in names)
         after = 1 + next(i for i, names in enumerate(_GROUPS) if "model" in names)
         groups = self._groups

@@ -176,7 +176,7 @@ class GradingView:
 
 def _said_of(finished: Finished) -> str:
     """What waits for a grader, and what was said, as tables; empty where there is neither."""
-    from rds.grading.review.listed import LOG, WAITING, log, waiting
+    from rds.grading.review.tables import LOG, WAITING, log, waiting
     from rds.results import html
 
     tables = (("Waits for a grader", WAITING, waiting(finished)), ("Audit trail", LOG, log(finished)))

@@ -96,7 +96,7 @@ class GradingState:
 
     def review(self) -> str:
         """Add what a grader says, and write all out again; what was kept, in a sentence."""
-        from rds.grading.review.say import say
+        from rds.grading.review.new_entries import say
 
         (entry,), finished = say(self.out, [entry_of(self.choices)])
         score = next((f": {g.score:g} points now" for g in finished.grades if g.student == entry.student), "")

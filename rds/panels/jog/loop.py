@@ -32,14 +32,14 @@ from rds.core.private_files import keep_process_private
 from rds.core.scheduling import raise_priority
 from rds.interpolators.motion.jog import advance
 from rds.machines import load_machine
-from rds.panels.jog.hands import Hand, open_hand
-from rds.panels.jog.orders import Orders, Wanted
+from rds.panels.jog.jog_commands import JogCommands, Wanted
+from rds.panels.jog.module_control import Hand, open_hand
 
 REPORTS = 20.0  # 1/s
 _PRIORITY = 50  # of SCHED_FIFO, below that of hub and simulated modules
 
 
-class NotWanted(Exception):
+class HomingCancelled(Exception):
     """A homing that is not wanted any more."""
 
 
@@ -55,7 +55,7 @@ class Reference:
         """Whether nothing shall move."""
         return not any(self.speeds.values())
 
-    def advance(self, hand: Hand, orders: Orders, wanted: Wanted | None, turning: Mapping[str, float]) -> None:
+    def advance(self, hand: Hand, orders: JogCommands, wanted: Wanted | None, turning: Mapping[str, float]) -> None:
         """Move on by a period: one axis towards its goal, the others to rest, spindles towards their speeds."""
         for name, axis in hand.axes.items():
             goal, speed = wanted[1:] if wanted is not None and wanted[0] == name else (None, axis.speed)
@@ -69,7 +69,7 @@ class Reference:
             self.speeds[name] += min(max(turning[name] - self.speeds[name], -most), most)
 
 
-def jog(hand: Hand, orders: Orders) -> None:
+def jog(hand: Hand, orders: JogCommands) -> None:
     """Hold all axes where they are, and move what is wanted, until `orders.ended`. MachineError where the bus fails."""
     hand.start()
     reference = _introduce(hand, orders)
@@ -99,7 +99,7 @@ def jog(hand: Hand, orders: Orders) -> None:
             due -= left  # what is late is not made up for
 
 
-def _home(hand: Hand, orders: Orders) -> list[str]:
+def _home(hand: Hand, orders: JogCommands) -> list[str]:
     """Let drives find home, as long as that is wanted; the axes that did."""
     methods = orders.homing
     places = dict(orders.places)
@@ -108,20 +108,20 @@ def _home(hand: Hand, orders: Orders) -> list[str]:
     def watch(axis: str, position: float) -> None:
         nonlocal report_at
         if orders.ended or orders.homing is not methods:
-            raise NotWanted
+            raise HomingCancelled
         places[axis] = position
         if time.monotonic() >= report_at:
             report_at = time.monotonic() + 1.0 / REPORTS
             _report(places, places, True, homing=axis)
 
-    with contextlib.suppress(NotWanted):
+    with contextlib.suppress(HomingCancelled):
         hand.home(methods, watch)
         orders.homed()
         return list(methods)
     return []
 
 
-def _introduce(hand: Hand, orders: Orders) -> Reference:
+def _introduce(hand: Hand, orders: JogCommands) -> Reference:
     """After a start: where the axes stand and are held, and their travel, which may be another one."""
     measured = hand.read()
     reference = Reference(hand, measured)
@@ -140,7 +140,7 @@ def _say(words: dict[str, Any]) -> None:
     sys.stdout.flush()
 
 
-def _read(orders: Orders) -> None:
+def _read(orders: JogCommands) -> None:
     rest = b""
     try:
         while data := os.read(0, 4096):
@@ -164,7 +164,7 @@ def main(arguments: list[str]) -> int:
                 stack.enter_context(Command(str(default_channel(machine, interface, bus.get("channel")))))
             hand = open_hand(dialect, machine, bus)
             stack.callback(hand.close)
-            orders = Orders(hand.axes, hand.spindles)
+            orders = JogCommands(hand.axes, hand.spindles)
             threading.Thread(target=_read, args=(orders,), daemon=True).start()
             jog(hand, orders)
     except RdsError as error:

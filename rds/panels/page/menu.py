@@ -9,7 +9,7 @@ import ipywidgets as widgets
 
 from rds.panels.kit.button import button
 from rds.panels.kit.html import Html
-from rds.panels.page.alive import Alive
+from rds.panels.page.first_visit import Alive
 from rds.panels.registry import PANELS
 
 NAME = "menu"

@@ -14,7 +14,7 @@ from rds.nc.check import validator_of, watched
 from rds.nc.cycle_time import CycleTime, cycle_time
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.parameters import read_parameters
-from rds.nc.language.reading_on import Later
+from rds.nc.language.rest_of_file import RestOfFile
 from rds.nc.path_block import PathBlock
 from rds.nc.run.prepare import least_seconds, require_room
 from rds.nc.setup import Setup
@@ -45,7 +45,7 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Look:
+class CheckState:
     """What one look found. `cycle`, `trouble` (why it cannot be planned), `cut` and `uncut` (why there is none) are of
     valid programs.
     """
@@ -86,10 +86,10 @@ def look(
     name: str,
     machine: Machine,
     setup: Setup,
-    early: Callable[[Look], None] = lambda found: None,
+    early: Callable[[CheckState], None] = lambda found: None,
     stock: str = "",
     part: Path | None = None,
-) -> Look:
+) -> CheckState:
     """Read, follow, plan and cut the program in `source`, which is called `name` for whoever reads this.
 
     `stock` and `part` are those of `rds.panels.program.stock.cut`. `early` gets what was found before planning and
@@ -100,13 +100,13 @@ def look(
         tools = setup.tool_list()
         parameters = read_parameters(setup.parameters) if setup.parameters else None
     except RdsError as error:
-        return Look((Mark(0, 0, 0, str(error)),))
+        return CheckState((Mark(0, 0, 0, str(error)),))
     setup = setup.on(machine, source)
     label = str(source)
     try:
         validator, trace = validator_of(source, machine, setup), Trace()
     except ProgramError as error:  # a configuration script of another machine
-        return Look((Mark(error.line, 0, 0, error.reason),))
+        return CheckState((Mark(error.line, 0, 0, error.reason),))
     try:
         follower = Follower(
             source,
@@ -118,7 +118,7 @@ def look(
             between=lambda: task.advance(0.0, 0.0, "checking"),
         )
     except ProgramError as error:
-        return Look((Mark(0, 0, 0, error.reason),))
+        return CheckState((Mark(0, 0, 0, error.reason),))
     kept: list[PathBlock] = []
     try:
         for block in validator.watch(watched(follower.run(), validator, setup, validator.report)):
@@ -127,23 +127,23 @@ def look(
     finally:
         follower.close()
     if validator.stopped is not None:
-        later = Later(validator.stopped, setup.options)
+        later = RestOfFile(validator.stopped, setup.options)
         for fault in later.faults():
             validator.report(fault)
         validator.read_on = later.some
     result = validator.result()
     marks = tuple(_marks(result, label))
     if not result.ok:
-        return Look(marks, result, trace, follower.modes)
+        return CheckState(marks, result, trace, follower.modes)
     try:
         task.note = "planning"
         require_room(least_seconds(kept), machine, machine.sample_period, Path(name))
-        early(Look(marks, result, trace, follower.modes))
+        early(CheckState(marks, result, trace, follower.modes))
         cycle = cycle_time(_divided(kept, task), machine)
         cycle.certificate.require(name)
     except RdsError as error:
-        return Look(marks, result, trace, follower.modes, trouble=str(error).replace(label, name))
-    found = Look(marks, result, trace, follower.modes, cycle)
+        return CheckState(marks, result, trace, follower.modes, trouble=str(error).replace(label, name))
+    found = CheckState(marks, result, trace, follower.modes, cycle)
     early(found)
     task.note = "cutting"
     try:

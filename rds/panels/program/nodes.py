@@ -20,7 +20,7 @@ from rds.nc.run.serial_methods import FREE
 from rds.nc.run.serial_motion import MOTIONS
 from rds.nc.run.serial_report import WORDS
 from rds.panels.program.nodes_process import BEGINS, DONE, FAILED, NOTE
-from rds.panels.program.nodes_run import CarriedOut, Order
+from rds.panels.program.nodes_run import CarriedOut, NodesRequest
 from rds.panels.program.state import Program
 from rds.panels.session.fields import Choice, Flag
 from rds.panels.session.session import RUNS, Session
@@ -90,7 +90,7 @@ class NodesRun:
         stamp = f"{time.strftime('%Y%m%d-%H%M%S')}-{self.file.stem}-by-{'-'.join(methods)}-{time.time_ns() % 10**6:06d}"
         self.folder: Path = self.session.folder / RUNS / stamp
         self.real_time = load_mode(mode).real_time
-        self.order = Order(
+        self.order = NodesRequest(
             self.file, program.machine.path, program.setup(), tuple(methods), mode, motion, folder=self.folder
         )
         self.notes: list[str] = []  # what of the program is not carried out, told before anything moves

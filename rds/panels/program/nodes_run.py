@@ -21,7 +21,7 @@ Say = Callable[[str, float, float | None], None]
 
 
 @dataclass(frozen=True)
-class Order:
+class NodesRequest:
     """What is to be carried out, by which methods, in which mode; `folder` is for the report's files."""
 
     file: Path
@@ -53,7 +53,7 @@ class CarriedOut:
         return methods_report(self.runs, self.file, self.settings)
 
 
-def carry_out(order: Order, say: Say, tell: Callable[[str], None]) -> CarriedOut:
+def carry_out(order: NodesRequest, say: Say, tell: Callable[[str], None]) -> CarriedOut:
     """Do it, and write its report. Errors as of `run_together` and `run_moves`.
 
     `say` hears what begins, how much is done (0 to 1), and the s that this takes, where it is known;
@@ -96,7 +96,7 @@ def carry_out(order: Order, say: Say, tell: Callable[[str], None]) -> CarriedOut
     return replace(made, files=files)
 
 
-def _served(machine: Machine, order: Order) -> str | None:
+def _served(machine: Machine, order: NodesRequest) -> str | None:
     """The channel on which the nodes of the machine are served already; None where the run has its own.
 
     InputError for modules that speak what the methods are not of.

@@ -11,7 +11,7 @@ import ipywidgets as widgets
 from rds.nc.validate import TOLERANCE
 from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
-from rds.panels.program.check import Look
+from rds.panels.program.check import CheckState
 from rds.panels.program.cut_html import cut_html
 from rds.panels.program.path_view import PathView
 from rds.panels.program.state import Program
@@ -23,7 +23,7 @@ class Preview:
 
     def __init__(self, program: Program):
         self._program = program
-        self._look: Look | None = None
+        self._look: CheckState | None = None
         self._space: Any = None  # made when somebody wants to see it
         self.path = PathView(program.machine)
         self.verdict = Notice()
@@ -40,7 +40,7 @@ class Preview:
         row.add_class("rds-row")
         self.widget = widgets.VBox([self.verdict, row, self._place, self.numbers])
 
-    def show(self, look: Look) -> None:
+    def show(self, look: CheckState) -> None:
         """What was found."""
         self._look = look
         self.verdict.say(look.sentence, "good" if look.ok else "error")
@@ -65,7 +65,7 @@ class Preview:
         self._place.children = [self._space.widget if on else self.path]
 
 
-def _numbers(look: Look, program: Program) -> str:
+def _numbers(look: CheckState, program: Program) -> str:
     parts = []
     if look.cycle is not None:
         shares = [(f"T{tool}" if tool else "no tool", share) for tool, share in look.cycle.by_tool.items()]

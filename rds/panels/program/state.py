@@ -26,7 +26,7 @@ from rds.panels.session.task import Task
 
 if TYPE_CHECKING:
     from rds.nc.setup import Setup
-    from rds.panels.program.check import Look
+    from rds.panels.program.check import CheckState
     from rds.panels.program.run import ProgramWork
 
 PANEL = "program"  # its name among the session's choices
@@ -119,9 +119,9 @@ class Program:
         self.machine = load_machine(session.machine)
         self.choices = program_choices(session)
         self.builds = Builds()
-        self.latest: Look | None = None
+        self.latest: CheckState | None = None
         self._looks = Latest(self._begin)
-        self._early: Look | None = None  # what is known while the motion is being planned
+        self._early: CheckState | None = None  # what is known while the motion is being planned
         self.trouble = ""  # why the file that was chosen is not open
         self.text = self._opened()
         self.choices.watch(self._chosen)
@@ -238,7 +238,7 @@ class Program:
         """Whether `latest` is not yet of the text as it is."""
         return self._looks.going_on
 
-    def tick(self) -> Look | None:
+    def tick(self) -> CheckState | None:
         """Ten times a second: begin to look where something has changed; what was found, once, when it is there."""
         task = self._looks.tick()
         if task is None:
@@ -247,21 +247,21 @@ class Program:
             return found
         self._early = None
         if task.error is not None:  # what was found before is of another text
-            from rds.panels.program.check import Look, Mark
+            from rds.panels.program.check import CheckState, Mark
 
-            self.latest = Look((Mark(0, 0, 0, f"the check failed: {task.error}"),))
+            self.latest = CheckState((Mark(0, 0, 0, f"the check failed: {task.error}"),))
         else:
             self.latest = task.result
         return self.latest
 
-    def _begin(self) -> Task[Look]:
+    def _begin(self) -> Task[CheckState]:
         text, setup, machine = self.text, self.setup(), self.machine
         stock, part = self._named("stock"), self._named("part")
 
-        def work(task: Task[Look]) -> Look:
+        def work(task: Task[CheckState]) -> CheckState:
             from rds.panels.program.check import look
 
-            def early(found: Look) -> None:
+            def early(found: CheckState) -> None:
                 if not task.stopping:
                     self._early = found
 

@@ -18,7 +18,7 @@ from rds.panels.kit.button import WAIT, attempt, is_free, say_error
 from rds.panels.kit.field import FieldView, check_mended, field_group
 from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
-from rds.panels.program.check import Look
+from rds.panels.program.check import CheckState
 from rds.panels.program.editor import Editor
 from rds.panels.program.files import ProgramFiles
 from rds.panels.program.mdi import Mdi
@@ -155,7 +155,7 @@ class ProgramView:
         if step is not None:
             self.preview.place(step.machine_position)
 
-    def _lay_stock(self, look: Look) -> None:
+    def _lay_stock(self, look: CheckState) -> None:
         """The stock that the program cuts, the part that it is meant to become, and the tools."""
         if look.cut is None:
             self.scene.lay({}, np.empty(0), {})
@@ -173,7 +173,7 @@ class ProgramView:
         if self.work is not None:
             self._look()
 
-    def _found(self, look: Look) -> None:
+    def _found(self, look: CheckState) -> None:
         self.editor.mark(look.marks)
         self.preview.show(look)
         if not self.program.looking:  # else the cut is still to come

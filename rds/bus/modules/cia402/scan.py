@@ -25,7 +25,7 @@ _DRIVE = 402
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundDevice:
     """A CANopen device; what it doesn't say is None."""
 
     node: int
@@ -55,7 +55,9 @@ class Found:
         return None if self.revision is None else f"{self.revision >> 16}.{self.revision & 0xFFFF}"
 
 
-def scan(interface: str = BUILTIN, channel: str | None = None, timeout: float = _WAIT, **options: Any) -> list[Found]:
+def scan(
+    interface: str = BUILTIN, channel: str | None = None, timeout: float = _WAIT, **options: Any
+) -> list[FoundDevice]:
     """The devices that answer an SDO request or are heard within `timeout` s, by node-ID; nothing is changed on them.
 
     `options` go to the python-can interface. Raises MachineError naming the devices that share a node-ID, and if
@@ -88,18 +90,18 @@ def _quiet() -> Iterator[None]:
         log.disabled = before
 
 
-def _ask(network: canopen.Network, node_id: int) -> Found:
+def _ask(network: canopen.Network, node_id: int) -> FoundDevice:
     node = network.add_node(node_id, canopen.ObjectDictionary())
     node.sdo.RESPONSE_TIMEOUT = _ANSWERS_IN
     try:
         kind = int.from_bytes(node.sdo.upload(0x1000, 0), "little")
     except SdoCommunicationError:  # every device has this object: nobody answers
-        return Found(node_id, None, None, None, None, None, None, answers=False)
+        return FoundDevice(node_id, None, None, None, None, None, None, answers=False)
     except SdoAbortedError:
         kind = None
     status, name = number(node, 0x6041), upload(node, 0x1008)
     profile = None if kind is None else kind & 0xFFFF
-    return Found(
+    return FoundDevice(
         node=node_id,
         profile=profile,
         name=None if name is None else name.rstrip(b"\0").decode("ascii", "replace"),

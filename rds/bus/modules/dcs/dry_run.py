@@ -8,25 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rds.bus.modules.course import LATE, Course
 from rds.bus.modules.dcs import frames
 from rds.bus.modules.dcs.answers import AnswerStream
 from rds.bus.modules.dcs.commands import BYTE_TIME
 from rds.bus.modules.dcs.frames import Info, Mode
 from rds.bus.modules.dcs.host import Host
 from rds.bus.modules.dcs.methods import LOOK, Feed, collect, segment_ends, send
+from rds.bus.modules.motion_course import LATE, MotionCourse
 from rds.bus.modules.segments import NodeSegment
 from rds.core.errors import MachineError
 
 
-def calls(host: Host, units: Sequence[int], steps: int) -> Course:
+def calls(host: Host, units: Sequence[int], steps: int) -> MotionCourse:
     """Method A: `steps` calls, one each 10 ms. MachineError for a unit that does not answer for 0.3 s, or resets."""
     port = host.port
     port.write(frames.encode(Info(Mode.SETUP), frames.setup_body(BYTE_TIME, 1)))
     port.sleep(port.now() + 4 * BYTE_TIME)
     port.read(0.0)
     begun = port.now() + BYTE_TIME
-    course = Course(begun, begun + steps * BYTE_TIME, steps)
+    course = MotionCourse(begun, begun + steps * BYTE_TIME, steps)
     silent, answers = dict.fromkeys(units, 0), AnswerStream()
     for k in range(steps):
         due = begun + k * BYTE_TIME
@@ -39,7 +39,7 @@ def calls(host: Host, units: Sequence[int], steps: int) -> Course:
 
 def filled(
     host: Host, data: Mapping[int, bytes], steps: int, nodes: Mapping[int, Sequence[NodeSegment]] | None = None
-) -> Course:
+) -> MotionCourse:
     """Methods B (with the segments of `nodes`) and C. MachineError for a unit that does not answer, or resets."""
     retries = host.counters.retries
     host.stop_all()
@@ -48,7 +48,7 @@ def filled(
         while send(host, feed):
             pass
     begun = host.port.now()
-    course = Course(begun, begun + steps * BYTE_TIME, steps)
+    course = MotionCourse(begun, begun + steps * BYTE_TIME, steps)
     try:
         while (look := host.port.now() + LOOK) < course.ended:
             for feed in feeds:

@@ -5,7 +5,7 @@
 - C: increments ahead of time, into buffers. `cyclic`: the buffer is refilled while it runs. Else as in the thesis: 1500
   bytes, then a byte of the host for each step and an answer of the master, then a pause to fill again.
 
-Each returns a `Course`: when the motion began and ended, by the port's clock, and what went wrong on the way.
+Each returns a `MotionCourse`: when the motion began and ended, by the port's clock, and what went wrong on the way.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from rds.bus.modules import segments
-from rds.bus.modules.course import LATE, Course
 from rds.bus.modules.dcs import commands, frames
 from rds.bus.modules.dcs.answers import AnswerStream
 from rds.bus.modules.dcs.buffers import bytes_of, fillings
 from rds.bus.modules.dcs.commands import BUFFER, BYTE_TIME, Report
 from rds.bus.modules.dcs.frames import Info, Mode, Status
 from rds.bus.modules.dcs.host import TRIES, Host, NoAnswer
+from rds.bus.modules.motion_course import LATE, MotionCourse
 from rds.bus.modules.segments import NodeSegment
 from rds.core.errors import MachineError
 
@@ -38,7 +38,7 @@ _WRAP = 1 << 16
 _SILENT = 30  # periods without an answer of a unit, after which it is asked what it does
 
 
-def method_a(host: Host, pulses: np.ndarray, slots: Mapping[int, int], period: float = BYTE_TIME) -> Course:
+def method_a(host: Host, pulses: np.ndarray, slots: Mapping[int, int], period: float = BYTE_TIME) -> MotionCourse:
     """A frame in each `period`: `pulses` (m × n) in BLU, of the units in `slots` (unit: place in a frame), in order.
 
     MachineError for a unit that resets, or that does not answer for 0.3 s.
@@ -48,7 +48,7 @@ def method_a(host: Host, pulses: np.ndarray, slots: Mapping[int, int], period: f
     port.sleep(port.now() + 4 * period)
     port.read(0.0)
     begun = port.now() + period
-    course = Course(begun, begun, len(pulses))
+    course = MotionCourse(begun, begun, len(pulses))
     silent = dict.fromkeys(slots, 0)
     answers = AnswerStream()
     places = list(slots.values())
@@ -67,7 +67,7 @@ def method_a(host: Host, pulses: np.ndarray, slots: Mapping[int, int], period: f
 
 
 def collect(
-    host: Host, answers: AnswerStream, number: int, deadline: float, silent: dict[int, int], course: Course
+    host: Host, answers: AnswerStream, number: int, deadline: float, silent: dict[int, int], course: MotionCourse
 ) -> None:
     """The answers of a frame, as far as they come."""
     awaited = set(silent)
@@ -95,7 +95,7 @@ def collect(
             silent[unit] = 0
 
 
-def method_b(host: Host, nodes: Mapping[int, Sequence[NodeSegment]], *, synchronize: bool = True) -> Course:
+def method_b(host: Host, nodes: Mapping[int, Sequence[NodeSegment]], *, synchronize: bool = True) -> MotionCourse:
     """The segments of each unit, which all take the same steps. Errors as `cyclic`."""
     steps = {sum(each.steps for each in found) for found in nodes.values()}
     assert len(steps) == 1
@@ -115,16 +115,16 @@ def segment_ends(nodes: Sequence[NodeSegment]) -> list[int]:
 
 def method_c(
     host: Host, pulses: np.ndarray, units: Sequence[int], *, as_thesis: bool = False, synchronize: bool = True
-) -> Course:
+) -> MotionCourse:
     """Buffers of `pulses` (m × n) in BLU; the first of `units` is the master. Errors as `cyclic`."""
     data = {unit: bytes_of(pulses[:, i]) for i, unit in enumerate(units)}
     return stepwise(host, data) if as_thesis else cyclic(host, data, len(pulses), synchronize=synchronize)
 
 
-def stepwise(host: Host, data: Mapping[int, bytes]) -> Course:
+def stepwise(host: Host, data: Mapping[int, bytes]) -> MotionCourse:
     """As the thesis's Execute: fill, step through, fill again. The motion rests meanwhile."""
     master, port = next(iter(data)), host.port
-    course = Course(0.0, 0.0, len(data[master]))
+    course = MotionCourse(0.0, 0.0, len(data[master]))
     rounds = list(zip(*(fillings(each) for each in data.values()), strict=True))
     retries = host.counters.retries
     for number, parts in enumerate(rounds):
@@ -185,7 +185,7 @@ def cyclic(
     ends: Mapping[int, Sequence[int]] | None = None,
     *,
     synchronize: bool = True,
-) -> Course:
+) -> MotionCourse:
     """Fill the units' cyclic buffers, go, and refill them until all `steps` are made.
 
     `data` are position bytes, or segments where `ends` says after which step each of them is over. Without
@@ -200,7 +200,7 @@ def cyclic(
             while send(host, feed):
                 pass
         begun = _go(host, feeds)
-        course = Course(begun, begun + steps * BYTE_TIME, steps)
+        course = MotionCourse(begun, begun + steps * BYTE_TIME, steps)
         clock = begun + _CLOCK
         while True:
             look = host.port.now() + LOOK

@@ -39,7 +39,7 @@ _LONGEST_SLEEP = 0.05  # s, so that a stop or a line on stdin is noticed
 _LOOK = 0.02  # s between two looks at stdin and the starter
 
 
-class End(Protocol):
+class LineEnd(Protocol):
     """The units' end of the line."""
 
     def read(self, timeout: float) -> bytes:
@@ -160,7 +160,7 @@ def serve(
 
 
 @contextmanager
-def _end_of(channel: str, line: FieldLine) -> Iterator[End]:
+def _end_of(channel: str, line: FieldLine) -> Iterator[LineEnd]:
     if is_device(channel):
         port = SerialPort(channel, line.baud)
         line.down.byte = line.up.byte = 0.0  # the real line takes its own time
@@ -178,7 +178,7 @@ def _end_of(channel: str, line: FieldLine) -> Iterator[End]:
 
 def _serve(
     line: FieldLine,
-    end: End,
+    end: LineEnd,
     stop: threading.Event,
     orphaned: threading.Event | None,
     afterlife: float,

@@ -35,7 +35,7 @@ _PATIENCE = 0.5  # s for a download
 _WORDS = {Change.APPEARED: "added", Change.DISAPPEARED: "removed", Change.CLASH: "clash"}
 
 
-class Happened(NamedTuple):
+class ModuleEvent(NamedTuple):
     """An event; `module` is "" where it is of no single one."""
 
     time: float  # s since the watch began
@@ -79,7 +79,7 @@ class Reconfigurations:
         """Of the modules that are there."""
         return sorted(module.id for module in self._watch.modules)
 
-    def look(self) -> list[Happened]:
+    def look(self) -> list[ModuleEvent]:
         """What has happened since the last look. MachineError if the bus fails."""
         first = self._began is None
         if self._began is None:
@@ -91,13 +91,13 @@ class Reconfigurations:
             if module is None:
                 continue
             word = "present" if first and change is Change.APPEARED else _WORDS[change]
-            happened.append(Happened(now, word, _name(module)))
+            happened.append(ModuleEvent(now, word, _name(module)))
             self._changed |= word in ("added", "removed")
         if first and self._expected is None:
             self._expected = max(1, len(self._watch.modules))
         if self._changed and self._is_ready():
             self._changed = False
-            happened.append(Happened(time.monotonic() - self._began, "ready", ""))
+            happened.append(ModuleEvent(time.monotonic() - self._began, "ready", ""))
         return happened
 
     def _is_ready(self) -> bool:
@@ -127,7 +127,7 @@ class EventFile:
         self._writer = csv.writer(self._file, lineterminator="\n")
         self._put(COLUMNS)
 
-    def add(self, happened: Happened) -> None:
+    def add(self, happened: ModuleEvent) -> None:
         """Write it."""
         self._put((f"{happened.time:.3f}", happened.event, happened.module))
 

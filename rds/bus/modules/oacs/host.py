@@ -9,7 +9,7 @@ from typing import Any
 
 import can
 
-from rds.bus.modules.oacs import messages, talk
+from rds.bus.modules.oacs import messages, messaging
 from rds.bus.modules.oacs.codes import NODES, Acknowledges, Code, Kind, Mode
 from rds.core.errors import MachineError
 
@@ -85,9 +85,9 @@ def identify(bus: can.BusABC, wait: float = WAIT) -> list[ModuleInfo]:
     """The modules that answer the identity call, by number and serial number, clashes included."""
     call = messages.encode("GeneralCall", Code=Code.IDENTITY)
     asked = time.monotonic()
-    talk.send(bus, call)
+    messaging.send(bus, call)
     found: dict[tuple[int, int], ModuleInfo] = {}
-    for message, _, at in talk.hear_all(bus, wait):
+    for message, _, at in messaging.hear_all(bus, wait):
         if message.kind == "Identity":
             fields = message.fields
             found[message.node, fields["Serial"]] = ModuleInfo(
@@ -126,8 +126,8 @@ def estop(bus: can.BusABC, wait: float = 0.1) -> list[int]:
     """
     stopped = set()
     for _ in range(2):
-        talk.send(bus, messages.encode("GeneralCall", Code=Code.EMERGENCY))
-        for message, _, _ in talk.hear_all(bus, wait):
+        messaging.send(bus, messages.encode("GeneralCall", Code=Code.EMERGENCY))
+        for message, _, _ in messaging.hear_all(bus, wait):
             if message.kind == "Reply" and message.fields.get("Acknowledges") == Acknowledges.EMERGENCY:
                 stopped.add(message.fields["BoardID"])
     return sorted(stopped)
@@ -135,10 +135,10 @@ def estop(bus: can.BusABC, wait: float = 0.1) -> list[int]:
 
 def _replies(bus: can.BusABC, call: Code, wait: float) -> dict[int, dict[str, None]]:
     """The texts that answer a general call, by number; two under one number are two modules."""
-    talk.send(bus, messages.encode("GeneralCall", Code=call))
+    messaging.send(bus, messages.encode("GeneralCall", Code=call))
     name, length = ("KindText", 5) if call == Code.CALL_ONE else ("TypeText", 6)
     texts: dict[int, dict[str, None]] = {}
-    for message, _, _ in talk.hear_all(bus, wait):
+    for message, _, _ in messaging.hear_all(bus, wait):
         if message.kind == "Reply" and message.fields["Code"] == int(call):
             texts.setdefault(message.fields["BoardID"], {})[messages.text(message.fields, name, length)] = None
     return texts

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import can
 
-from rds.bus.modules.oacs import messages, talk
+from rds.bus.modules.oacs import messages, messaging
 from rds.bus.modules.oacs.codes import Acknowledges, Code, MessageToHost, Move, Parameter, Result, check_node
 from rds.bus.modules.oacs.messages import Decoded
 from rds.bus.modules.oacs.refusals import REFUSED, reason
@@ -19,7 +19,7 @@ PATIENCE = 0.5  # s for a module to say a word
 _KEEP_ALIVE = 0.5  # s; modules stop a motion when they hear nothing for 2 s
 
 
-class Done(NamedTuple):
+class CommandEnd(NamedTuple):
     """How a command ended."""
 
     result: Result
@@ -34,13 +34,15 @@ class Conversation:
         self.bus = bus
         self.number = check_node(number)
         self.name = f"module {name} (number {number})" if name else f"module {number}"
-        self.listen: Callable[[talk.Heard], None] = lambda heard: None  # everything that the module says
+        self.listen: Callable[[messaging.ReceivedMessage], None] = lambda heard: None  # everything that the module says
 
     def send(self, **fields: Any) -> None:
         """A command."""
-        talk.send(self.bus, messages.encode("Command", self.number, **fields))
+        messaging.send(self.bus, messages.encode("Command", self.number, **fields))
 
-    def wait_for(self, wanted: Callable[[Decoded], bool], what: str, seconds: float = PATIENCE) -> talk.Heard:
+    def wait_for(
+        self, wanted: Callable[[Decoded], bool], what: str, seconds: float = PATIENCE
+    ) -> messaging.ReceivedMessage:
         """The module's next message that is `wanted`. MachineError naming module and `what` after `seconds`."""
         heard = self._hear(wanted, seconds)
         if heard is None:
@@ -50,12 +52,12 @@ class Conversation:
             )
         return heard
 
-    def _hear(self, wanted: Callable[[Decoded], bool], seconds: float) -> talk.Heard | None:
+    def _hear(self, wanted: Callable[[Decoded], bool], seconds: float) -> messaging.ReceivedMessage | None:
         """The same, None if it does not come in time. Meanwhile the module hears that the host lives."""
         until = time.monotonic() + seconds
         alive = time.monotonic() + _KEEP_ALIVE
         while True:
-            heard = talk.hear(self.bus, min(until, alive))
+            heard = messaging.hear(self.bus, min(until, alive))
             if heard is not None and self._is_mine(heard.message):
                 self.listen(heard)
                 if wanted(heard.message):
@@ -67,20 +69,20 @@ class Conversation:
                 alive = now + _KEEP_ALIVE
                 self.send(Code=Code.READ_PARAMETER, ReadIndex=Parameter.SELECT)
 
-    def command(self, what: str, answers: Acknowledges, **fields: Any) -> Done:
+    def command(self, what: str, answers: Acknowledges, **fields: Any) -> CommandEnd:
         """Send a command and wait until it is carried out or accepted. MachineError if it is refused, or not heard."""
         asked = time.monotonic()
         self.drain()
         self.send(**fields)
         heard = self.wait_for(acknowledgement(answers), what)
-        done = Done(Result(heard.message.fields["Result"]), heard.message.fields["AcknowledgePosition"], 0.0)
+        done = CommandEnd(Result(heard.message.fields["Result"]), heard.message.fields["AcknowledgePosition"], 0.0)
         if done.result > Result.ACCEPTED:
             raise MachineError(f"{self.name} refused {what}: {reason(done.result)}")
         return done._replace(seconds=heard.at - asked)
 
     def finish(
         self, what: str, answers: Acknowledges, seconds: float, also: Collection[Result] = (Result.CARRIED_OUT,)
-    ) -> Done:
+    ) -> CommandEnd:
         """Wait until an accepted command is carried out, or ends with one of `also`.
 
         MachineError if it fails or takes longer than `seconds`.
@@ -92,7 +94,7 @@ class Conversation:
         result, counts = Result(heard.message.fields["Result"]), heard.message.fields["AcknowledgePosition"]
         if result not in also:
             raise MachineError(f"{self.name} was told {what} and did not finish: {reason(result)}")
-        return Done(result, counts, heard.at - asked)
+        return CommandEnd(result, counts, heard.at - asked)
 
     def hold(self, what: str, answers: Acknowledges, seconds: float) -> None:
         """Let an accepted command that has no end of its own go on for `seconds`. MachineError if it ends before."""
@@ -113,7 +115,7 @@ class Conversation:
 
     def drain(self) -> None:
         """Take what was said before, so that an old word does not count as the answer to a new command."""
-        while talk.hear(self.bus, 0.0) is not None:
+        while messaging.hear(self.bus, 0.0) is not None:
             pass
 
     def _is_mine(self, message: Decoded) -> bool:

@@ -18,11 +18,11 @@ from typing import NamedTuple
 from rds.bus.modules.oacs import codes as words
 from rds.bus.modules.oacs import messages
 from rds.bus.modules.oacs.codes import Acknowledges, Code, MessageToHost, Mode, Parameter, Result
+from rds.bus.modules.oacs.command_handling import obey
 from rds.bus.modules.oacs.iso_tp import Sender
 from rds.bus.modules.oacs.messages import Frame
 from rds.bus.modules.oacs.module_data import ModuleData
 from rds.bus.modules.oacs.mover import Mover
-from rds.bus.modules.oacs.obey import obey
 from rds.bus.modules.oacs.pid import FIELDS, Tuning
 from rds.bus.modules.oacs.plant import Plant
 from rds.bus.modules.oacs.readings import Readings
@@ -38,7 +38,7 @@ LOG = logging.getLogger(__name__)
 HEARTBEAT = 5e-3  # s between two looks at a module in motion; what it does then depends on bus time alone
 
 
-class Due(NamedTuple):
+class DueFrame(NamedTuple):
     """A frame, and the instant from which it may be sent."""
 
     at: float
@@ -72,7 +72,7 @@ class OacsModule:
         self.draft: Tuning = self.mover.tuning  # parameters received that do not take effect yet
         self._description = encode_description(data.describe(self.serial, slot + 1))
         self._sender: Sender | None = None
-        self._queue: list[Due] = []
+        self._queue: list[DueFrame] = []
         self._order = count()
         self._grid = start  # a line of the grid of slots: when the last general call came
         self._said: tuple[object, ...] = ()
@@ -253,7 +253,7 @@ class OacsModule:
 
     def send(self, frame: Frame, at: float) -> None:
         """Queue a frame that may be sent from the instant `at` on; frames of one instant keep their order."""
-        heappush(self._queue, Due(at, next(self._order), frame))
+        heappush(self._queue, DueFrame(at, next(self._order), frame))
 
     def slot(self, at: float) -> float:
         """The first instant from `at` on at which this module may send 0x000 of its own accord."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import can
 
-from rds.bus.modules.oacs.events import Happened, Reconfigurations
+from rds.bus.modules.oacs.events import ModuleEvent, Reconfigurations
 from rds.bus.modules.oacs.remote import Module
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError, MachineError
@@ -42,7 +42,7 @@ class Offers:
         self._watching = Reconfigurations(bus, modules=1)
         self._due = False
 
-    def look(self) -> tuple[list[Happened], Offer | None]:
+    def look(self) -> tuple[list[ModuleEvent], Offer | None]:
         """What has happened since the last look, and an offer once all modules have said what they are after a change.
 
         MachineError if the bus fails.
@@ -81,12 +81,12 @@ class Offers:
         write_whole(path, machine_text(path.stem, offer.order, offer.data, self._before).encode())
         return load_machine(str(path))
 
-    def accept(self, offer: Offer, path: Path) -> tuple[Machine, Happened]:
+    def accept(self, offer: Offer, path: Path) -> tuple[Machine, ModuleEvent]:
         """Write the machine's file, and go on with it. InputError for what makes no machine."""
         self._before = self.write(offer, path)
         return self._before, self.now("ready")
 
-    def move(self, axis: str, by: float) -> Happened:
+    def move(self, axis: str, by: float) -> ModuleEvent:
         """Move an axis of the machine by so much, and wait for its end; return when it began to.
 
         InputError for an axis that the machine does not have, MachineError if its module refuses.
@@ -101,6 +101,6 @@ class Offers:
         module.wait(_SLACK + 2.0 * 60.0 * abs(by) / max(slowest, 1e-3))
         return moving
 
-    def now(self, event: str, module: str = "") -> Happened:
+    def now(self, event: str, module: str = "") -> ModuleEvent:
         """An event of this moment."""
-        return Happened(self._watching.now, event, module)
+        return ModuleEvent(self._watching.now, event, module)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rds.bus.modules.oacs.codes import MessageToHost
-from rds.bus.modules.oacs.talk import Heard
+from rds.bus.modules.oacs.messaging import ReceivedMessage
 from rds.bus.modules.oacs.transfer import ModuleDescription
 from rds.core.errors import MachineError
 from rds.results import Result
@@ -66,7 +66,7 @@ class PositionRecorder:
         """For how long the position has stayed within 2 counts or 0.2 % of the step, s; 0 until it has moved."""
         return (self._last[0] - self._since) * self._period if self._moved else 0.0
 
-    def take(self, heard: Heard) -> None:
+    def take(self, heard: ReceivedMessage) -> None:
         """A message of the module."""
         fields = heard.message.fields
         if heard.message.kind == "Reply" and fields["Code"] == MessageToHost.POSITION:
@@ -111,7 +111,7 @@ class ReadingsRecorder:
         """Time recorded so far, s."""
         return (max(self._rows, default=0) - min(self._rows, default=0)) * self._period
 
-    def take(self, heard: Heard) -> None:
+    def take(self, heard: ReceivedMessage) -> None:
         """A message of the module."""
         kind, fields = heard.message.kind, heard.message.fields
         if kind == "Acceleration":

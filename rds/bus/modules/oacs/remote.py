@@ -24,11 +24,11 @@ from rds.bus.modules.oacs.codes import (
 )
 from rds.bus.modules.oacs.codes import Result as Ended
 from rds.bus.modules.oacs.iso_tp import fetch
-from rds.bus.modules.oacs.link import Conversation, Done
+from rds.bus.modules.oacs.link import CommandEnd, Conversation
+from rds.bus.modules.oacs.messaging import ReceivedMessage
 from rds.bus.modules.oacs.pid import FIELDS, Tuning
 from rds.bus.modules.oacs.recording import PositionRecorder, ReadingsRecorder
 from rds.bus.modules.oacs.refusals import REASONS, reason
-from rds.bus.modules.oacs.talk import Heard
 from rds.bus.modules.oacs.transfer import ModuleDescription, decode_description
 from rds.bus.tools.link import bus_failed
 from rds.core.errors import InputError, MachineError
@@ -176,11 +176,11 @@ class Module:
         what, answers = self._started
         return self._link.finish(what, answers, timeout).counts * self.description.resolution
 
-    def stop(self) -> Done:
+    def stop(self) -> CommandEnd:
         """Zero volts now."""
         return self._link.command("to stop", Acknowledges.STOP, Code=Code.MOVE, Move=Move.STOP)
 
-    def switch_direction(self) -> Done:
+    def switch_direction(self) -> CommandEnd:
         """What is left of the motion under way, the other way round; a tool or a jog turns round."""
         what, move = "to switch its direction", Move.SWITCH_DIRECTION
         return self._link.command(what, Acknowledges.SWITCH_DIRECTION, Code=Code.MOVE, Move=move)
@@ -213,7 +213,7 @@ class Module:
         with self._followed(progress):
             return self._link.finish("to home", Acknowledges.HOME, seconds).counts * d.resolution
 
-    def reset_emergency(self) -> Done:
+    def reset_emergency(self) -> CommandEnd:
         """Release the latch of the emergency stop."""
         return self._link.command("to reset its emergency stop", Acknowledges.EMERGENCY, Code=Code.EMERGENCY)
 
@@ -244,7 +244,7 @@ class Module:
         recorder = PositionRecorder(d, period, by)
         ends = {Ended.CARRIED_OUT, Ended.STALLED}
 
-        def listen(heard: Heard) -> None:
+        def listen(heard: ReceivedMessage) -> None:
             recorder.take(heard)
             progress(*recorder.way)
             if settled and recorder.still >= settled and Ended.STOPPED_BY_COMMAND not in ends:
@@ -287,7 +287,7 @@ class Module:
     def _followed(self, progress: Callable[[float], None]) -> Iterator[None]:
         """`progress` hears of the positions that the module tells of its motion."""
 
-        def listen(heard: Heard) -> None:
+        def listen(heard: ReceivedMessage) -> None:
             fields = heard.message.fields
             if heard.message.kind == "Reply" and fields["Code"] == MessageToHost.POSITION:
                 progress(fields["Position"] * self.description.resolution)

@@ -18,7 +18,7 @@ SUSPECTED = 3  # so many, and then silence, are enough
 _HALF_TURN = COUNT_TURNS // 2
 
 
-class Place(Enum):
+class AnswerPosition(Enum):
     """Where an answer stands among those of its module."""
 
     LAST = "to the last tick"
@@ -50,27 +50,27 @@ class AnswerOrder:
         """Ticks that the answer counts more than were sent."""
         return (answer.ticks - self.expected + _HALF_TURN) % COUNT_TURNS - _HALF_TURN
 
-    def place(self, answer: Answer) -> Place:
+    def place(self, answer: Answer) -> AnswerPosition:
         """Where the answer stands; it is remembered."""
         if not self.seen:
-            return Place.LAST
+            return AnswerPosition.LAST
         if answer.ticks == self.expected and self.since:  # as nearly always
             self._highest = self.expected
             self._strays = 0
-            return Place.LAST
+            return AnswerPosition.LAST
         new = (answer.ticks - self._highest) % COUNT_TURNS
         if not 1 <= new <= self.since + DUPLICATES:
             on = (answer.ticks - self._stray) % COUNT_TURNS
             if not self._strays or on:  # one that comes twice says nothing
                 self._strays = self._strays + 1 if self._strays and on <= DUPLICATES else 1
                 self._stray = answer.ticks
-            return Place.ASTRAY
+            return AnswerPosition.ASTRAY
         self._highest = answer.ticks
         self._strays = 0
         if self.owed and self.ahead(answer) < 0:
             self.owed -= 1
-            return Place.EARLIER
-        return Place.LAST
+            return AnswerPosition.EARLIER
+        return AnswerPosition.LAST
 
     def is_another(self, silent: bool = False) -> bool:
         """Whether the answers are those of another module; with `silent`, it has said nothing else for long."""

@@ -19,7 +19,7 @@ import can
 from rds.bus.modules import drivers_base
 from rds.bus.modules.can_drivers import CanDrivers, Handler
 from rds.bus.modules.rds import frames
-from rds.bus.modules.rds.answer_order import AnswerOrder, Place
+from rds.bus.modules.rds.answer_order import AnswerOrder, AnswerPosition
 from rds.bus.modules.rds.frames import Answer, Kind, Status
 from rds.bus.modules.rds.identity import WAIT as LISTENING
 from rds.bus.modules.rds.identity import listen, refuse_clashes, refuse_others
@@ -224,18 +224,18 @@ class AxisDrivers(CanDrivers[_Module]):
         if late:
             if not module.seen:
                 return None
-            if self._place(module, answer) is not Place.ASTRAY:
+            if self._place(module, answer) is not AnswerPosition.ASTRAY:
                 self._count_lost(module.order.straggler(answer))
             return module
         place = self._place(module, answer)
-        if place is Place.LAST:
+        if place is AnswerPosition.LAST:
             if not self._started:
                 module.ignored = 0 if answer.status & _OBEYS else module.ignored + 1
             self._count_lost(module.order.take(answer))
             module.counts = answer.counts
             return module
         self.counters.late += 1
-        if place is Place.EARLIER:
+        if place is AnswerPosition.EARLIER:
             module.doubtful = answer
         return None
 
@@ -254,13 +254,13 @@ class AxisDrivers(CanDrivers[_Module]):
         self.counters.refused += bool(answer.status & Status.REFUSED)
         return True
 
-    def _place(self, module: _Module, answer: Answer) -> Place:
+    def _place(self, module: _Module, answer: Answer) -> AnswerPosition:
         """Where the answer stands among those of its module. MachineError if they are another module's."""
         place = module.order.place(answer)
-        if place is not Place.ASTRAY:
+        if place is not AnswerPosition.ASTRAY:
             return place
         if not self._started:
-            return Place.LAST
+            return AnswerPosition.LAST
         if module.order.is_another():
             raise self._replaced(module)
         return place

@@ -23,19 +23,19 @@ _COMMANDS = (frames.COMMAND, frames.DRY_COMMAND)
 
 
 @dataclass
-class Heard:
+class IdentityAnswers:
     """Who answered, and how many commands of another host went by."""
 
     modules: list[Identity] = field(default_factory=list)
     commands: int = 0
 
 
-def listen(bus: can.BusABC, wait: float = WAIT) -> Heard:
+def listen(bus: can.BusABC, wait: float = WAIT) -> IdentityAnswers:
     """Call all modules, and listen for `wait` s; nothing moves. MachineError if the bus fails.
 
     `bus` must let extended frames and commands through. On a bus with bit timing where nobody is, nobody is heard.
     """
-    heard = Heard()
+    heard = IdentityAnswers()
     found: set[Identity] = set()
     try:
         bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=frames.WHO), wait)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rds.bus.modules.course import LATE, Course
+from rds.bus.modules.motion_course import LATE, MotionCourse
 from rds.bus.modules.rds import frames, motion_frames
 from rds.bus.modules.rds.motion_frames import PIECE, WRAP, Buffer, Gain, MotionStatus, Progress, Verb
 from rds.bus.modules.rds.motion_port import Frame, MotionPort
@@ -109,14 +109,14 @@ class MotionHost:
 
     # --- method A
 
-    def set_points(self, rows: Sequence[Sequence[int]], slots: Mapping[int, int], period: float) -> Course:
+    def set_points(self, rows: Sequence[Sequence[int]], slots: Mapping[int, int], period: float) -> MotionCourse:
         """A frame in each period with each module's set point, in sixteenths of a count; `slots` are places by node.
 
         MachineError for a module that does not answer for 30 periods, or that has let go of its axis.
         """
         port = self.port
         begun = port.now() + period
-        course = Course(begun, begun + len(rows) * period, len(rows))
+        course = MotionCourse(begun, begun + len(rows) * period, len(rows))
         silent = dict.fromkeys(slots, 0)
         for k, row in enumerate(rows):
             due = begun + k * period
@@ -132,11 +132,11 @@ class MotionHost:
         port.sleep(course.ended)
         return course
 
-    def calls(self, nodes: Sequence[int], steps: int, period: float) -> Course:
+    def calls(self, nodes: Sequence[int], steps: int, period: float) -> MotionCourse:
         """A dry run of method A: a call in each period, and nothing moves."""
         port = self.port
         begun = port.now() + period
-        course = Course(begun, begun + steps * period, steps)
+        course = MotionCourse(begun, begun + steps * period, steps)
         silent = dict.fromkeys(nodes, 0)
         for k in range(steps):
             due = begun + k * period
@@ -158,7 +158,7 @@ class MotionHost:
             left.discard(frame.identifier - frames.ANSWER)
         return left
 
-    def _count(self, silent: dict[int, int], missing: set[int], course: Course, dry: bool = False) -> None:
+    def _count(self, silent: dict[int, int], missing: set[int], course: MotionCourse, dry: bool = False) -> None:
         course.missing += len(missing)
         for node in silent:
             silent[node] = silent[node] + 1 if node in missing else 0
@@ -178,7 +178,7 @@ class MotionHost:
 
     def stream(
         self, pieces: Mapping[int, Sequence[bytes]], steps: int, period: float, synchronize: bool = True
-    ) -> Course:
+    ) -> MotionCourse:
         """Fill the buffers of modules that have begun, go, and refill them until all `steps` are made.
 
         `synchronize`: the modules' clocks are kept together. MachineError for a module that restarts, does not answer,
@@ -191,7 +191,7 @@ class MotionHost:
                 self._fill(feed, self.progress(feed.node))
             self._control(Verb.GO)
             begun = self.port.now()
-            course = Course(begun, begun + steps * period, steps)
+            course = MotionCourse(begun, begun + steps * period, steps)
             self._run(feeds, steps, begun if synchronize else None)
         except BaseException:
             self.stop_all()
@@ -199,14 +199,14 @@ class MotionHost:
         course.retries = self.retries
         return course
 
-    def dry(self, pieces: Mapping[int, Sequence[bytes]], steps: int, period: float) -> Course:
+    def dry(self, pieces: Mapping[int, Sequence[bytes]], steps: int, period: float) -> MotionCourse:
         """Fill the buffers and never say go: the host's work for as long as the motion takes, and nothing moves."""
         feeds = [_Feed(node, each) for node, each in pieces.items()]
         self.retries = 0
         for feed in feeds:
             self._fill(feed, self.progress(feed.node))
         begun = self.port.now()
-        course = Course(begun, begun + steps * period, steps)
+        course = MotionCourse(begun, begun + steps * period, steps)
         try:
             while (look := self.port.now() + LOOK) < course.ended:
                 for feed in feeds:

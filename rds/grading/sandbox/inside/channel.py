@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 from rds.grading.sandbox import frames
-from rds.grading.sandbox.door import Closed, Door
 from rds.grading.sandbox.inside import walls
 from rds.grading.sandbox.records import Layout
+from rds.grading.sandbox.shared_channel import ChannelClosed, SharedChannel
 
 _LONGEST = 2000  # characters of an error
 
@@ -29,7 +29,7 @@ class Channel:
         unpack, pack, size = layout.question.unpack, layout.answer.pack, layout.question.size
         if not through_door:
             return lambda: unpack(self.receive(size)), lambda *answer: self.send(pack(*answer))
-        return Door(*self._door, self.questions, asks=False).answerer(layout)
+        return SharedChannel(*self._door, self.questions, asks=False).answerer(layout)
 
     def receive(self, count: int) -> bytes:
         """Exactly `count` bytes."""
@@ -37,7 +37,7 @@ class Channel:
         while len(data) != count:  # hardly ever: a pipe hands over small writes whole
             part = os.read(self.questions, count - len(data))
             if not part:
-                raise Closed
+                raise ChannelClosed
             data += part
         return data
 

@@ -25,9 +25,9 @@ from itertools import islice
 from types import CodeType, FrameType, ModuleType, SimpleNamespace, TracebackType
 from typing import Any, NamedTuple
 
-from rds.grading.sandbox.door import Closed
 from rds.grading.sandbox.inside import kernel
 from rds.grading.sandbox.records import OK, TOTAL, Layout
+from rds.grading.sandbox.shared_channel import ChannelClosed
 
 _TRACES = frozenset({"sys.settrace", "sys.setprofile"})
 _LOOKS = frozenset({"sys._getframe", "sys._current_frames", "sys._current_exceptions"})
@@ -40,7 +40,7 @@ _AS_A_LINE = 25  # instructions: of a line with very many, so many count as one 
 _FULL_LINE, _NO_LINE = 200, 8  # bytes of instructions; on one line, and on none (where a function begins, say)
 
 
-class Counted(NamedTuple):
+class RunCount(NamedTuple):
     """One run's count. `begin` it before the submission's first work, `stop` it before anything is explained.
 
     `receive` takes the next question (number, doubles), `send` gives its answer (number, code, doubles), `total` the
@@ -54,7 +54,7 @@ class Counted(NamedTuple):
     stop: Callable[[], None]
 
 
-def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequence[ModuleType]) -> Counted:
+def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequence[ModuleType]) -> RunCount:
     """Count from now on. The modules `own` ask and answer, and are not counted themselves."""
     # by these names, which a submission cannot exchange
     settrace, setprofile, gettrace, getprofile = sys.settrace, sys.setprofile, sys.gettrace, sys.getprofile
@@ -211,13 +211,13 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
         while len(data) != asked:
             part = read(questions, asked - len(data))
             if not part:
-                raise Closed
+                raise ChannelClosed
             data += part
         return unpack(data)
 
     def send(number: int, code: int, *values: float) -> None:
         if secret is None or write(answers, pack(number, code ^ secret, *values)) != answered:
-            raise Closed
+            raise ChannelClosed
 
     def total() -> None:
         is_whole = gettrace() is tracing and getprofile() is calling
@@ -240,7 +240,7 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
         return _hidden(take)
 
     tracing, calling = _hidden(line), _hidden(call)
-    found = Counted(*[_hidden(each) for each in (begin, receive, send, total, stop)])
+    found = RunCount(*[_hidden(each) for each in (begin, receive, send, total, stop)])
     sys.gettrace = sys.getprofile = lambda: None  # it looks like a run that is not counted
     sys.settrace, sys.setprofile = quiet(settrace), quiet(setprofile)
     sys._getframe, _imp.create_builtin, _signal.signal = _hidden(look), _hidden(create_new), _hidden(handle)

@@ -19,14 +19,14 @@ from rds.core.types import ArcSegment, LineSegment, Reference, Segment
 from rds.core.values import shown
 from rds.grading.sandbox import records
 from rds.grading.sandbox.inside.channel import Channel, Receive, Send
-from rds.grading.sandbox.inside.counting import Counted
+from rds.grading.sandbox.inside.counting import RunCount
 from rds.machines.converter import as_voltage
 from rds.models.student import student_model
 from rds.modes.loop.laws import LiveReference, controlled, coupled
 from rds.modes.parts import start
 
 
-def control(channel: Channel, student: StudentFile, order: dict[str, Any], counted: Counted | None = None) -> None:
+def control(channel: Channel, student: StudentFile, order: dict[str, Any], counted: RunCount | None = None) -> None:
     """A controller of `order["axes"]` axes, in lock step."""
     axes = int(order["axes"])
     layout = records.control_layout(axes)
@@ -87,7 +87,7 @@ def _all_axes(references: Sequence[LiveReference]) -> Take:
     return take
 
 
-def model(channel: Channel, student: StudentFile, order: dict[str, Any], counted: Counted | None = None) -> None:
+def model(channel: Channel, student: StudentFile, order: dict[str, Any], counted: RunCount | None = None) -> None:
     """A model in motion: voltage in, output after that sample out."""
     receive, send = _begun(channel, records.MODEL, order, counted)
     try:
@@ -112,7 +112,7 @@ def model(channel: Channel, student: StudentFile, order: dict[str, Any], counted
         send(k, records.OK, output)
 
 
-def rows(channel: Channel, student: StudentFile, order: dict[str, Any], counted: Counted | None = None) -> None:
+def rows(channel: Channel, student: StudentFile, order: dict[str, Any], counted: RunCount | None = None) -> None:
     """An interpolator's rows, a block at each question."""
     segment = _segment(order["segment"])
     axes = len(segment.start)
@@ -159,7 +159,7 @@ def layout_of(order: dict[str, Any]) -> records.Layout:
 
 
 def _begun(
-    channel: Channel, layout: records.Layout, order: dict[str, Any], counted: Counted | None
+    channel: Channel, layout: records.Layout, order: dict[str, Any], counted: RunCount | None
 ) -> tuple[Receive, Send]:
     """What questions and answers go through; what is counted is so from now on."""
     if counted is None:
@@ -173,13 +173,13 @@ def _segment(data: dict[str, Any]) -> Segment:
     return ArcSegment(**fields) if fields.pop("kind") == "arc" else LineSegment(**fields)
 
 
-def _refuse(channel: Channel, error: BaseException, student: StudentFile, counted: Counted | None) -> None:
+def _refuse(channel: Channel, error: BaseException, student: StudentFile, counted: RunCount | None) -> None:
     if counted:
         counted.stop()
     channel.tell_error(_said(error, student))
 
 
-def _explain(channel: Channel, error: BaseException, student: StudentFile, t: float, counted: Counted | None) -> None:
+def _explain(channel: Channel, error: BaseException, student: StudentFile, t: float, counted: RunCount | None) -> None:
     if counted:
         counted.stop()
     said = _said(error, student)

@@ -28,7 +28,7 @@ LARGEST = 1 << 16  # bytes of one request
 _ABOVE = 20  # the descriptors that a submission's process keeps; all between these and stderr are closed
 
 
-class Ends(NamedTuple):
+class ChannelEnds(NamedTuple):
     """The inner ends of one submission's channels: descriptors."""
 
     questions: int
@@ -65,7 +65,7 @@ def main(descriptor: int, preload: list[str]) -> None:
         request = json.loads(data)
         if os.fork() == 0:
             control.close()
-            _between(request, Ends(*received), baseline, calls, worker)
+            _between(request, ChannelEnds(*received), baseline, calls, worker)
         for fd in received:
             os.close(fd)
 
@@ -76,14 +76,14 @@ def _pages() -> list[str]:
 
 def _receive(control: socket.socket) -> tuple[bytes, list[int]]:
     fds = array.array("i")
-    data, ancillary, _, _ = control.recvmsg(LARGEST, socket.CMSG_SPACE(len(Ends._fields) * fds.itemsize))
+    data, ancillary, _, _ = control.recvmsg(LARGEST, socket.CMSG_SPACE(len(ChannelEnds._fields) * fds.itemsize))
     for level, kind, payload in ancillary:
         if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS):
             fds.frombytes(payload)
     return data, list(fds)
 
 
-def _between(request: dict[str, Any], ends: Ends, baseline: int, calls: bytes, worker: Any) -> NoReturn:
+def _between(request: dict[str, Any], ends: ChannelEnds, baseline: int, calls: bytes, worker: Any) -> NoReturn:
     """The process between the warm interpreter and init: it makes the namespaces and is gone."""
     try:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
@@ -96,7 +96,7 @@ def _between(request: dict[str, Any], ends: Ends, baseline: int, calls: bytes, w
     os._exit(0)
 
 
-def _init(request: dict[str, Any], ends: Ends, baseline: int, calls: bytes, worker: Any) -> NoReturn:
+def _init(request: dict[str, Any], ends: ChannelEnds, baseline: int, calls: bytes, worker: Any) -> NoReturn:
     """Number 1: the kernel tells the grader its number; when it ends, the kernel ends all that is left below it."""
     status = socket.socket(fileno=ends.status)
     try:
@@ -122,7 +122,7 @@ def _init(request: dict[str, Any], ends: Ends, baseline: int, calls: bytes, work
 
 
 def _submission(
-    request: dict[str, Any], ends: Ends, status: socket.socket, baseline: int, calls: bytes, worker: Any
+    request: dict[str, Any], ends: ChannelEnds, status: socket.socket, baseline: int, calls: bytes, worker: Any
 ) -> NoReturn:
     """The process that runs the submission, behind all walls."""
     try:

@@ -21,12 +21,12 @@ from rds.core.errors import ContractError, InputError
 from rds.core.load import StudentFile, load_student
 from rds.core.run_text import load_error
 from rds.core.signature import INTERFACES, form
-from rds.grading.sandbox.door import Closed
 from rds.grading.sandbox.frames import FrameError
 from rds.grading.sandbox.inside import runs, walls
 from rds.grading.sandbox.inside.channel import Channel
-from rds.grading.sandbox.inside.counting import Counted, counted, work_alone
+from rds.grading.sandbox.inside.counting import RunCount, counted, work_alone
 from rds.grading.sandbox.inside.plain import NotPlain, plain
+from rds.grading.sandbox.shared_channel import ChannelClosed
 
 _RUNS = {"control": runs.control, "model": runs.model, "rows": runs.rows}
 _OWN = ("rds.checks.rows", "rds.core.types", "rds.core.values", "rds.machines.converter", "rds.modes.loop.laws")
@@ -54,7 +54,7 @@ def main(questions: int, answers: int, door: list[int]) -> int:
                 _call(channel, loaded, order, file)
             elif order["op"] in _RUNS and isinstance(loaded, StudentFile):
                 _RUNS[order["op"]](channel, loaded, order, count)
-    except Closed:
+    except ChannelClosed:
         return 0
 
 
@@ -119,7 +119,7 @@ class _NotHere:
         raise self._error
 
 
-def _counted(questions: int, answers: int, order: dict[str, Any] | None) -> Counted | None:
+def _counted(questions: int, answers: int, order: dict[str, Any] | None) -> RunCount | None:
     """The count of the run that `order` announces, sealed by its number; None if nothing is to be counted."""
     if order is None:
         return None
@@ -127,7 +127,7 @@ def _counted(questions: int, answers: int, order: dict[str, Any] | None) -> Coun
     return counted(questions, answers, runs.layout_of(order), order["seal"], [runs, *map(import_module, _OWN)])
 
 
-def _load(channel: Channel, kind: str, file: Path, count: Counted | None) -> StudentFile | ModuleType | None:
+def _load(channel: Channel, kind: str, file: Path, count: RunCount | None) -> StudentFile | ModuleType | None:
     """Run the file and tell what it defines; None if it cannot be used."""
     try:
         loaded = _functions(file) if kind == "functions" else _interface(kind, file)

@@ -15,15 +15,15 @@ from rds.grading.grade import Status
 from rds.grading.sandbox import records
 from rds.grading.sandbox.budget import Budget
 from rds.grading.sandbox.cell import Cell
-from rds.grading.sandbox.counts import Counts, count_again
 from rds.grading.sandbox.errors import SubmissionError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.limits import Limits
 from rds.grading.sandbox.output import printable
-from rds.grading.sandbox.place import Place
+from rds.grading.sandbox.processors import Processors
 from rds.grading.sandbox.run import Run, reason
 from rds.grading.sandbox.submission import Submission
 from rds.grading.sandbox.supervise import Supervisor
+from rds.grading.sandbox.work_counts import WorkCounts, count_again
 
 KINDS = ("controller", "model", "interpolator", "functions")
 
@@ -52,7 +52,7 @@ class LoadedSubmission:
         limits: Limits,
         interpreter: Callable[[], Interpreter],
         supervisor: Supervisor,
-        place: Place,
+        place: Processors,
     ):
         if kind not in KINDS:
             raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
@@ -68,7 +68,7 @@ class LoadedSubmission:
         self.loaded = Loaded(())
         self._run: Run | None = None
         self._order: Mapping[str, Any] = {}
-        self._counts: Counts | None = None
+        self._counts: WorkCounts | None = None
         self._affinity = os.sched_getaffinity(0)
         os.sched_setaffinity(0, place.own)
         try:
@@ -172,20 +172,20 @@ class LoadedSubmission:
         return self.loaded.defines
 
     @property
-    def counts(self) -> Counts:
+    def counts(self) -> WorkCounts:
         """Of the whole run that was begun last; see `count`."""
         if self._counts is None:
             self._counts = self.count()
         return self._counts
 
-    def count(self, most_samples: int | None = None) -> Counts:
+    def count(self, most_samples: int | None = None) -> WorkCounts:
         """The figures of the run that was begun last, in its first `most_samples` samples (all if None).
 
         The same questions are asked once more, in a fresh cell that counts. The run itself is over after that.
         """
         run, order = self._run, self._order
         if run is None:
-            return Counts(0, refused="no run was begun")
+            return WorkCounts(0, refused="no run was begun")
         self._leave()
         generous, budget = self._generous(), self._counting
         budget.limits = generous
@@ -197,7 +197,7 @@ class LoadedSubmission:
             again = Run(cell, run.what, run.layout, run.T, seal=seal)
             return count_again(first, again)
         except SubmissionError as error:
-            return Counts(len(first), refused=f"while it was counted: {error.reason}")
+            return WorkCounts(len(first), refused=f"while it was counted: {error.reason}")
         finally:
             self._leave()
             self._printed.pop()  # the same once more

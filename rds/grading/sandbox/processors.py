@@ -6,11 +6,11 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from rds.grading.sandbox.door import can_be_used
+from rds.grading.sandbox.shared_channel import can_be_used
 
 
 @dataclass(frozen=True)
-class Place:
+class Processors:
     """`own` is the grader's processors, `inner` the submission's. They are other ones if `apart`."""
 
     own: tuple[int, ...]
@@ -22,7 +22,7 @@ class Place:
         return not set(self.own) & set(self.inner) and can_be_used()
 
     @classmethod
-    def of(cls, jobs: int, slot: int | None) -> Place:
+    def of(cls, jobs: int, slot: int | None) -> Processors:
         """For job number `slot` of `jobs` at the same time; beside the processor that the grader is on if it is None.
 
         With two processors for each job, grader and submission have one each. With fewer they share one: they never

@@ -11,7 +11,7 @@ if TYPE_CHECKING:  # a file that its author tries without a sandbox is counted t
 
 
 @dataclass(frozen=True)
-class Counts:
+class WorkCounts:
     """Deterministic figures of one run's work: the same for the same input, on a busy computer too.
 
     `events` are lines, calls and returns of Python, and calls of compiled functions, in all `calls` together. They are
@@ -23,13 +23,13 @@ class Counts:
     refused: str = ""
 
 
-def count_again(first: Sequence[Sample], again: Run) -> Counts:
+def count_again(first: Sequence[Sample], again: Run) -> WorkCounts:
     """The questions of a run asked once more in the counted run `again`, which must give the same answers."""
     for asked, answered in first:
         if again.ask(*asked)[2:] != answered:
             t = (again.k - 1) * again.T
-            return Counts(len(first), refused=f"at t = {t:.3f} s it answered otherwise while it was counted")
+            return WorkCounts(len(first), refused=f"at t = {t:.3f} s it answered otherwise while it was counted")
     events = again.total()
     if events < 0:
-        return Counts(len(first), refused="it has tampered with the counter")
-    return Counts(len(first), events)
+        return WorkCounts(len(first), refused="it has tampered with the counter")
+    return WorkCounts(len(first), events)

@@ -15,7 +15,7 @@ SPINDLE_DEAD_MAN = 1.0  # s without a word after which a spindle does
 Wanted = tuple[str, float, float]  # axis, goal, speed
 
 
-class Orders:
+class JogCommands:
     """`hear` is called by the thread that reads, the rest by the loop, which keeps `places` where the axes are."""
 
     def __init__(self, axes: Mapping[str, JogAxis], spindles: Mapping[str, JogSpindle]):

@@ -9,17 +9,19 @@ import pytest
 
 from rds.core.types import Reference
 from rds.grading.sandbox import Limits, Pool, SubmissionError
-from rds.grading.sandbox.asleep import Asleep
-from rds.grading.sandbox.processes import Turns
+from rds.grading.sandbox.processes import ThreadTimes
+from rds.grading.sandbox.sleep_time import SleepTime
 
 LOOK = 0.02  # s
 
 
-def looks(computed: float, waited: float, sleeps: int, is_same: bool, graded: float = 0.0, held: float = 0.0) -> Asleep:
+def looks(
+    computed: float, waited: float, sleeps: int, is_same: bool, graded: float = 0.0, held: float = 0.0
+) -> SleepTime:
     """After 100 looks, between which so many seconds each were computed and waited."""
-    asleep = Asleep()
+    asleep = SleepTime()
     for n in range(101):
-        answering, grading = Turns(n * computed, n * waited), Turns(n * graded, n * held)
+        answering, grading = ThreadTimes(n * computed, n * waited), ThreadTimes(n * graded, n * held)
         asleep.look(LOOK, answering, grading, n * sleeps, is_same)
     return asleep
 
@@ -37,9 +39,9 @@ def test_one_answer_that_waits_for_a_processor() -> None:
 
 def test_a_wait_that_is_told_late_is_taken_back() -> None:
     """The kernel adds a wait when it is over: one of 0.1 s across five looks."""
-    asleep = Asleep()
+    asleep = SleepTime()
     for waited in (0.0, 0.0, 0.0, 0.0, 0.0, 0.1):
-        asleep.look(LOOK, Turns(0.0, waited), Turns(0.0, 0.0), 0, True)
+        asleep.look(LOOK, ThreadTimes(0.0, waited), ThreadTimes(0.0, 0.0), 0, True)
     assert asleep.own == pytest.approx(0.0)
 
 
@@ -59,7 +61,7 @@ def test_many_answers(computed: float, waited: float, graded: float, held: float
 
 
 def test_a_kernel_that_does_not_tell() -> None:
-    asleep = Asleep()
+    asleep = SleepTime()
     for _ in range(3):
         asleep.look(LOOK, None, None, 5, True)
     assert (asleep.slept, asleep.own, asleep.between) == (False, 0.0, 0.0)

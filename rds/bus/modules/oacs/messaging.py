@@ -15,7 +15,7 @@ from rds.bus.tools.listening import frames_within
 from rds.core.errors import MachineError
 
 
-class Heard(NamedTuple):
+class ReceivedMessage(NamedTuple):
     """A message, its time stamp (s, the bus's clock) and when it was in hand (s, time.monotonic)."""
 
     message: Decoded
@@ -32,7 +32,7 @@ def send(bus: can.BusABC, frame: Frame) -> None:
         raise bus_failed(bus.channel_info, error) from error
 
 
-def hear(bus: can.BusABC, until: float) -> Heard | None:
+def hear(bus: can.BusABC, until: float) -> ReceivedMessage | None:
     """The next message of a module; None if there is none until `until` (time.monotonic). MachineError: bus failed.
 
     Frames of others, and frames that make no sense, are passed over: on a bus everybody may speak.
@@ -51,7 +51,7 @@ def hear(bus: can.BusABC, until: float) -> Heard | None:
             return heard
 
 
-def hear_all(bus: can.BusABC, seconds: float) -> Iterator[Heard]:
+def hear_all(bus: can.BusABC, seconds: float) -> Iterator[ReceivedMessage]:
     """Every message of the next `seconds`. MachineError: bus failed."""
     try:
         for frame in frames_within(bus, seconds):
@@ -61,7 +61,7 @@ def hear_all(bus: can.BusABC, seconds: float) -> Iterator[Heard]:
         raise bus_failed(bus.channel_info, error) from error
 
 
-def _heard(frame: can.Message) -> Heard | None:
+def _heard(frame: can.Message) -> ReceivedMessage | None:
     """The message that a frame is; None if it is somebody else's, or makes no sense."""
     if frame.is_error_frame or frame.is_remote_frame:
         return None
@@ -71,4 +71,4 @@ def _heard(frame: can.Message) -> Heard | None:
         message = messages.decode(frame.arbitration_id, frame.data, frame.is_extended_id)
     except MachineError:
         return None
-    return Heard(message, frame.timestamp, time.monotonic())
+    return ReceivedMessage(message, frame.timestamp, time.monotonic())

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rds.grading.sandbox.processes import Turns
+from rds.grading.sandbox.processes import ThreadTimes
 
 _MUCH = 0.5  # of the time between two looks: less may be a computer's that stands still for moments
 
 
 @dataclass
-class Asleep:
+class SleepTime:
     """Told at each look by `look`. Times in s; they stay 0 where the kernel does not tell.
 
     `slept`: whether the submission has gone to sleep by its own will since the last look.
@@ -25,9 +25,11 @@ class Asleep:
     slept: bool = False
     own: float = 0.0
     between: float = 0.0
-    _last: tuple[Turns, Turns, int] | None = None
+    _last: tuple[ThreadTimes, ThreadTimes, int] | None = None
 
-    def look(self, seconds: float, answering: Turns | None, grading: Turns | None, sleeps: int, is_same: bool) -> None:
+    def look(
+        self, seconds: float, answering: ThreadTimes | None, grading: ThreadTimes | None, sleeps: int, is_same: bool
+    ) -> None:
         """`seconds` after the last look; `is_same`: whether the submission still has, or has not, the same turn.
 
         `answering` and `grading` are of the submission's and the grader's thread, `sleeps` is how often the former has.

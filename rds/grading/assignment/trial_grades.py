@@ -20,7 +20,7 @@ DECIDES = 20  # samples after which a cheat knows the case by its reference
 _MOST = 1 / 3  # of all points: what students see may be known by heart, and must not pay more
 
 
-class Tried:
+class TrialGrades:
     """Designs graded for the first student of a check."""
 
     def __init__(

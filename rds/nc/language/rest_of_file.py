@@ -131,7 +131,7 @@ def faults_never_run(path: Path, options: Dialect) -> list[ProgramError]:
         reading.close()
 
 
-class Later:
+class RestOfFile:
     """The rest of the file in which a fault ended a program: `faults` of its words; `some`: there was something."""
 
     def __init__(self, first: ProgramError, options: Dialect):

@@ -8,7 +8,7 @@ LATE = 1e-3  # s by which a frame is late
 
 
 @dataclass
-class Course:
+class MotionCourse:
     """How a motion went: instants in s, by the clock of the host's port."""
 
     begun: float

@@ -1,7 +1,7 @@
 """Several modules moved together, each by its own controller: started at once, waited for until all have arrived.
 
 The host of the thesis runs a part program so (oacs-thesis, 8.7): a command to each axis of a line, and the next line
-when every module has acknowledged that it carried its command out. `Several` speaks through a port: an open bus, or
+when every module has acknowledged that it carried its command out. `ModuleGroup` speaks through a port: an open bus, or
 virtual modules in bus time, in which a run of minutes takes seconds and gives the same numbers each time.
 """
 
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, NoReturn, Protocol
 
 import can
 
-from rds.bus.modules.oacs import messages, talk
+from rds.bus.modules.oacs import messages, messaging
 from rds.bus.modules.oacs.codes import THOUSAND, Acknowledges, Code, Move, Parameter, Result, Select
 from rds.bus.modules.oacs.link import PATIENCE, acknowledgement
 from rds.bus.modules.oacs.messages import Decoded, Frame
@@ -31,7 +31,7 @@ _RUNDOWN = 60.0  # s that a tool may take to come to rest
 _LEAST_STEP = 1e-6  # s, by which virtual time goes on at least
 
 
-class Arrived(NamedTuple):
+class MotionEnd(NamedTuple):
     """The end of a motion: where the axis stands by its module, counts, and how long the command took, s."""
 
     counts: int
@@ -59,10 +59,10 @@ class BusPort:
         return time.monotonic()
 
     def send(self, frame: Frame) -> None:
-        talk.send(self._bus, frame)
+        messaging.send(self._bus, frame)
 
     def hear(self, until: float) -> Decoded | None:
-        heard = talk.hear(self._bus, until)
+        heard = messaging.hear(self._bus, until)
         return None if heard is None else heard.message
 
 
@@ -97,7 +97,7 @@ class VirtualPort:
                 self._said.append(messages.decode(identifier, data, extended))
 
 
-class Several:
+class ModuleGroup:
     """The modules `names` (by number, as errors call them) behind a port. Every call raises MachineError naming the
     module that refuses, fails or says nothing; all of them are told to stop then, and by Ctrl-C."""
 
@@ -124,14 +124,14 @@ class Several:
         fields = {"Code": Code.MOVE, "Move": Move.STOP}
         return self._command(number, "to say where it stands", Acknowledges.STOP, fields).counts
 
-    def to(self, targets: Mapping[int, float], seconds: float) -> dict[int, Arrived]:
+    def to(self, targets: Mapping[int, float], seconds: float) -> dict[int, MotionEnd]:
         """Move axes to points (mm, degrees), all at once; return how each arrived, after `seconds` at most."""
         asked = self.port.now()
         with self._stopping():
             for number, target in targets.items():
                 argument = round(target * THOUSAND)
                 self._send(number, Code=Code.MOVE, Move=Move.TO_POINT, Argument=argument)
-            left, accepted, found = set(targets), set[int](), dict[int, Arrived]()
+            left, accepted, found = set(targets), set[int](), dict[int, MotionEnd]()
             while left:
                 patience = PATIENCE if left - accepted else seconds
                 number, result, counts = self._answer(left, Acknowledges.TO_POINT, asked + patience)
@@ -143,7 +143,7 @@ class Several:
                 elif result == Result.ACCEPTED:
                     accepted.add(number)
                 elif result == Result.CARRIED_OUT:
-                    found[number] = Arrived(counts, self.port.now() - asked)
+                    found[number] = MotionEnd(counts, self.port.now() - asked)
                     left.discard(number)
                 elif not (number in accepted and result in REFUSED and self.port.now() >= asked + PATIENCE):
                     # within the patience the acceptance may be another host's, and the refusal ours
@@ -191,7 +191,7 @@ class Several:
     def _send(self, number: int, **fields: Any) -> None:
         self.port.send(messages.encode("Command", number, **fields))
 
-    def _command(self, number: int, what: str, answers: Acknowledges, fields: Mapping[str, Any]) -> Arrived:
+    def _command(self, number: int, what: str, answers: Acknowledges, fields: Mapping[str, Any]) -> MotionEnd:
         """A command that is carried out, or accepted, at once."""
         asked = self.port.now()
         with self._stopping():
@@ -202,7 +202,7 @@ class Several:
                            "cable (`rds scan` shows who is there, and what they speak)")  # fmt: skip
             elif result > Result.ACCEPTED:
                 self._fail(number, f"refused {what}: {reason(result)}")
-        return Arrived(counts, self.port.now() - asked)
+        return MotionEnd(counts, self.port.now() - asked)
 
     def _answer(self, numbers: Collection[int], answers: Acknowledges, until: float) -> tuple[int, Result | None, int]:
         """Who of them acknowledges that command next, how, and where it stands; no result if nobody does by then."""

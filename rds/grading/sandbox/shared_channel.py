@@ -50,11 +50,11 @@ def make_bell() -> int:
     return os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
 
 
-class Closed(Exception):
+class ChannelClosed(Exception):
     """The other side has ended."""
 
 
-class Door:
+class SharedChannel:
     """One side of it: the grader's if `asks`. `memory`, `own_bell` and `other_bell` are descriptors.
 
     `sign_of_life` is a pipe's that hangs up when the other side ends.
@@ -70,7 +70,7 @@ class Door:
         self._poll.register(sign_of_life, 0)  # POLLHUP and POLLERR come unasked
 
     def asker(self, layout: Layout) -> Callable[[int, tuple[float, ...]], tuple[Any, ...]]:
-        """The grader's function: sample number and doubles out, (number, code, doubles) back; `Closed` at the end.
+        """The grader's function: sample number and doubles out, (number, code, doubles) back, or `ChannelClosed`.
 
         Both functions are written out flat: a call within them costs as much as the hand-over itself.
         """
@@ -93,7 +93,7 @@ class Door:
         return ask
 
     def answerer(self, layout: Layout) -> tuple[Callable[[], tuple[Any, ...]], Callable[..., None]]:
-        """The submission's functions: one takes the next question, one gives its answer; `Closed` at the end."""
+        """The submission's functions: one takes the next question, one gives its answer; `ChannelClosed` at the end."""
         memory, words, pack_into, unpack_from = self._memory, self._words, *_codecs(layout.answer, layout.question)
         ring, sleep, looks, number = self._ring, self._sleep, range(_LOOKS), 0
 
@@ -131,7 +131,7 @@ class Door:
             os.eventfd_write(self._other_bell, 1)
 
     def _sleep(self, number: int) -> None:
-        """Until the other side has come to `number`; `Closed` if it has ended before."""
+        """Until the other side has come to `number`; `ChannelClosed` if it has ended before."""
         words, asleep = self._words, self._own + 1
         words[asleep] = 1
         try:
@@ -141,7 +141,7 @@ class Door:
                         with suppress(BlockingIOError):
                             os.eventfd_read(descriptor)
                     elif words[self._other] != number:
-                        raise Closed
+                        raise ChannelClosed
         finally:
             words[asleep] = 0
 
