@@ -82,7 +82,10 @@ ONLY = {
             for name in ("frames", "module", "motion_frames", "motion_host", "motion_port")
         ),
         *("rds.bus.modules.rds", "rds.bus.medium.bits"),
-        *(f"rds.bus.modules.oacs.{name}" for name in ("codes", "messages", "module", "module_data", "pid", "several")),
+        *(
+            f"rds.bus.modules.oacs.{name}"
+            for name in ("codes", "messages", "module", "module_data", "pid", "module_group")
+        ),
     },
     ("jobs", "bus"): {"rds.bus.hub.runtime_folder"},  # where the user's sockets are
     ("interpolators", "results"): {"rds.results"},  # their tables
