@@ -89,7 +89,7 @@ def _of_dbc(path: Path, period: float | None) -> MessageTable:
 
 
 def _switches_rate(entry: Any, database: Any) -> bool:
-    """Whether a CAN FD frame's data go at the data bit rate, by Vector's enumeration "0", "1"; yes where it is absent."""
+    """Whether a CAN FD frame's data go at the data bit rate, by Vector's words "0", "1"; yes if absent."""
     attribute = entry.dbc.attributes.get(_SWITCH)
     if attribute is not None:
         return str(attribute.value) != "0"
