@@ -50,6 +50,25 @@ def test_a_dbc_file_is_analysed_and_messages_without_a_period_are_named(tmp_path
     assert "OnChange" in done.stderr
 
 
+def test_a_can_fd_message_switches_the_bit_rate_unless_the_file_says_no(tmp_path: Path) -> None:
+    formats = ",".join(f'"{name}"' for name in ("StandardCAN", "ExtendedCAN", *["reserved"] * 12, "StandardCAN_FD"))
+    fd = f"""{DBC}BA_DEF_ BO_ "VFrameFormat" ENUM {formats};
+BA_DEF_DEF_ "VFrameFormat" "StandardCAN";
+BA_ "VFrameFormat" BO_ 256 14;
+BA_ "VFrameFormat" BO_ 512 14;
+"""
+    switch = 'BA_DEF_ BO_ "CANFD_BRS" ENUM "0","1";\nBA_DEF_DEF_ "CANFD_BRS" "{}";\nBA_ "CANFD_BRS" BO_ 512 {};\n'
+    for more, switched in (
+        ("", (True, True)),
+        (switch.format(1, 0), (True, False)),
+        (switch.format(0, 1), (False, True)),
+    ):
+        (tmp_path / "car.dbc").write_text(fd + more)
+        found = {m.name: m for m in read_messages(tmp_path / "car.dbc", period=0.1).messages}
+        assert found["Speed"].fd and not found["Status"].fd
+        assert (found["Speed"].bitrate_switch, found["OnChange"].bitrate_switch) == switched
+
+
 def test_a_csv_table_says_the_same(tmp_path: Path) -> None:
     (tmp_path / "car.csv").write_text(
         "identifier;period_ms;length;name;jitter_us\n0x100;10;8;Speed;50\n# slow ones\n0x18FEF1FE;100;8;Status;\n"

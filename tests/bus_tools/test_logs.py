@@ -263,6 +263,14 @@ def test_a_frame_that_no_bus_could_carry_is_left_out_and_counted(impossible: str
     assert log.impossible == 1 and log.skipped == 0
 
 
+@pytest.mark.parametrize("classes", ["20000004", "20000080", "2000008C", "30000001"])
+def test_candump_logs_error_frames_of_every_class(classes: str, tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(f"(1.5) can0 {classes}#0004000000000000\n(1.6) can0 00000004#11\n")
+    error, data = LogFile(tmp_path / "a.log")
+    assert error.is_error_frame and error.timestamp == 1.5
+    assert not data.is_error_frame and (data.arbitration_id, data.is_extended_id) == (4, True)
+
+
 @pytest.mark.parametrize(
     "text, line",
     [

@@ -58,8 +58,8 @@ SECOND = (0x18FEF1FE, True, b"\x01\xff", False)
         ("c.txt", CRTD, 2, 0),
         ("c.crtd", CRTD, 2, 0),
         ("d.can", MICROCHIP, 6, 0),
-        ("e.log", CANDUMP, 1, 0),
-        ("e.txt", CANDUMP, 1, 0),
+        ("e.log", CANDUMP, 0, 0),
+        ("e.txt", CANDUMP, 0, 0),
     ],
 )
 def test_frames_are_what_the_tool_wrote(name: str, text: str, skipped: int, impossible: int, tmp_path: Path) -> None:
@@ -69,7 +69,8 @@ def test_frames_are_what_the_tool_wrote(name: str, text: str, skipped: int, impo
     assert [(m.arbitration_id, m.is_extended_id, bytes(m.data), m.is_rx) for m in frames[:2]] == [FIRST, SECOND]
     assert frames[1].timestamp - frames[0].timestamp == pytest.approx(0.0015, abs=1e-6)
     assert (log.skipped, log.impossible) == (skipped, impossible)
-    assert len(frames) == (3 if name == "b.log" else 2) and all(m.is_remote_frame for m in frames[2:])
+    assert len(frames) == (3 if text in (BUSMASTER, CANDUMP) else 2)
+    assert all(m.is_error_frame if text == CANDUMP else m.is_remote_frame for m in frames[2:])
 
 
 def test_the_older_form_of_gvret_has_no_direction(tmp_path: Path) -> None:
@@ -228,4 +229,4 @@ def test_distances_of_candump_are_refused_where_the_first_line_is_not_there(tmp_
 
 def test_a_clock_that_is_set_back_is_no_distance(tmp_path: Path) -> None:
     (tmp_path / "a.log").write_text(CANDUMP.replace("1436509052.25", "1436509050.25"))
-    assert len(list(LogFile(tmp_path / "a.log"))) == 2
+    assert len(list(LogFile(tmp_path / "a.log"))) == 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rds.bus.analysis.messages import Message
 from rds.core.errors import InputError
@@ -25,6 +25,7 @@ _COLUMNS = (
 )
 _YES, _NO = ("1", "yes", "true", "x"), ("", "0", "no", "false")
 _HIGHEST_STANDARD = 0x7FF
+_SWITCH = "CANFD_BRS"
 _NO_MESSAGE = "VECTOR__INDEPENDENT_SIG_MSG"  # where Vector's editor keeps signals of no message
 
 
@@ -59,12 +60,13 @@ def read_messages(path: Path, period: float | None = None) -> MessageTable:
 
 
 def _of_dbc(path: Path, period: float | None) -> MessageTable:
-    """By the attribute GenMsgCycleTime (ms); CAN FD by VFrameFormat."""
+    """By the attribute GenMsgCycleTime (ms); CAN FD by VFrameFormat, its bit-rate switch by CANFD_BRS."""
     from rds.bus.tools.decode import load_dbc
 
     messages: list[Message] = []
     silent: list[str] = []
-    for entry in load_dbc(path).messages:
+    database = load_dbc(path)
+    for entry in database.messages:
         if entry.name == _NO_MESSAGE:
             continue
         its_period = entry.cycle_time * 1e-3 if entry.cycle_time else period
@@ -80,10 +82,19 @@ def _of_dbc(path: Path, period: float | None) -> MessageTable:
                 period=its_period,
                 sender=entry.senders[0] if entry.senders else None,
                 fd=entry.is_fd,
-                bitrate_switch=entry.is_fd,
+                bitrate_switch=entry.is_fd and _switches_rate(entry, database),
             )
         )
     return MessageTable(messages, silent)
+
+
+def _switches_rate(entry: Any, database: Any) -> bool:
+    """Whether a CAN FD frame's data go at the data bit rate, by Vector's words "0", "1"; yes if absent."""
+    attribute = entry.dbc.attributes.get(_SWITCH)
+    if attribute is not None:
+        return str(attribute.value) != "0"
+    definition = database.dbc.attribute_definitions.get(_SWITCH)
+    return definition is None or str(definition.default_value) != "0"
 
 
 def _of_csv(path: Path, period: float | None) -> MessageTable:

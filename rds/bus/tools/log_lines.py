@@ -21,6 +21,10 @@ _CANDUMP = re.compile(
     r"(R\d*|#[0-9A-F]([0-9A-F]{2}){0,64}|([0-9A-F]{2}){0,64})(\s+[RT])?",
     re.IGNORECASE,
 )
+_ERROR = re.compile(
+    r"(?<=\s)[23][0-9A-F]{7}(?=#)", re.IGNORECASE
+)  # SocketCAN's identifier of an error frame: its classes
+_BUS_ERROR = 0x80
 # time, channel, identifier and, if it was not cut off there, the direction: an event has a word for an identifier
 _ASC_FRAME = re.compile(r"\d+\.\d+\s+(CANFD\s+)?\d+(\s+(Rx|Tx))?(\s+[0-9A-F]+x?(\s.*)?)?", re.IGNORECASE)
 _ASC_HEADING = re.compile(
@@ -38,11 +42,13 @@ class Rules(NamedTuple):
     """Of a text format: what is wrong with a line, and whether it should have given a frame (None: a comment).
 
     `opening` is a line that the reader needs above the first line that is no heading: it passes over the next one.
+    `handed` is a line as the reader takes it for what it is.
     """
 
     check: Callable[[str, int], str | None]
     is_frame: Callable[[str], bool | None]
     opening: str = ""
+    handed: Callable[[str], str] = str
 
 
 class Lines:
@@ -57,7 +63,7 @@ class Lines:
         self._characters = 0
         self._longest = int(_LONGEST * lifted())
         self._path = path
-        self._check, self._is_frame, self._opening = rules
+        self._check, self._is_frame, self._opening, self._handed = rules
         self._line = self._held = ""
         self.number = 0
         self.frames = 0  # that came of the last line
@@ -83,7 +89,7 @@ class Lines:
         problem = self._check(self._line.strip(), self.number)
         if problem:
             raise self.fault(problem)
-        return self._line
+        return self._handed(self._line)
 
     def _next(self) -> str:
         line = self._file.readline(self._longest)
@@ -135,6 +141,11 @@ def _check_candump(line: str, number: int) -> str | None:
     return f"{_short(line)} is no line of `candump -L`, as in '(1700000000.000000) can0 123#11223344'"
 
 
+def _candump_error(line: str) -> str:
+    """An error frame is one to python-can's reader if a bus error is among its classes, and else a frame with data."""
+    return _ERROR.sub(lambda found: f"{int(found[0], 16) | _BUS_ERROR:08X}", line)
+
+
 def _check_csv(line: str, number: int) -> str | None:
     if number == 1 and line != _CSV_HEADING:
         return f"the first line must be {_CSV_HEADING!r}, not {_short(line)}"
@@ -174,7 +185,7 @@ def _csv_frame(line: str) -> bool | None:
 
 
 ASC = Rules(_anything, _asc_frame, "no internal events logged\n")
-CANDUMP = Rules(_check_candump, _always)
+CANDUMP = Rules(_check_candump, _always, handed=_candump_error)
 TRC = Rules(_anything, _trc_frame)
 CSV = Rules(_check_csv, _csv_frame)
 

@@ -208,7 +208,7 @@ class _Candump:
             raise ValueError("no time in brackets, identifier and length")
         words = line[found.end() :].split()
         identifier, size = found["id"], int(found["size"])
-        if "ERRORFRAME" in words or len(found["size"]) > 2:  # four digits: CAN XL
+        if len(found["size"]) > 2:  # four digits: CAN XL
             return None
         remote = words[:1] == ["remote"]
         data = b"" if remote else bytes(int(word, 16) for word in words[:size])
@@ -217,6 +217,8 @@ class _Candump:
             raise ValueError("its time goes back: `candump -t d` writes the distance to the frame before; use -t a")
         self._times = [*self._times[:1], stamp]
         received, channel = found["way"] != "TX", found["channel"]
+        if "ERRORFRAME" in words:
+            return can.Message(timestamp=stamp, is_error_frame=True, channel=channel)
         message = _message(stamp, int(identifier, 16), len(identifier) > 3, data, size, received, remote, channel)
         message.is_fd = len(found["size"]) == 2
         message.bitrate_switch = message.is_fd and found["switched"] == "B"

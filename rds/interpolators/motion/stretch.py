@@ -178,6 +178,10 @@ class Stretch:
 
         tried = {tau: time(tau) for share in AVERAGES if (tau := max(share * self._longest, least))}
         best = min(tried, key=lambda tau: (tried[tau], -tau))
+        while best == min(tried) > least:  # a move far shorter than the ramp to full acceleration
+            shorter = max(AVERAGES[-1] / AVERAGES[-2] * best, least)
+            tried[shorter] = time(shorter)
+            best = min(tried, key=lambda tau: (tried[tau], -tau))
         if len(f) > FEW:
             return best
         step = sqrt(AVERAGES[0] / AVERAGES[1])
