@@ -23,7 +23,8 @@ def as_voltage(value: Any) -> float:
         return value
     number = value
     if getattr(value, "size", None) == 1 and getattr(getattr(value, "dtype", None), "kind", "") in ("f", "i", "u"):
-        number = value.item()
+        mask = getattr(value, "mask", False)  # of numpy's masked arrays: what is under it is no answer
+        number = None if not callable(mask) and mask else value.item()
     try:
         if isinstance(number, Real) and not isinstance(number, bool) and isfinite(number):
             return float(number)

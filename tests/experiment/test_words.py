@@ -256,6 +256,11 @@ def test_files_that_cannot_be_read(alone: Path) -> None:
         ("def advance(x, u, T, params):\n    return x\n", "no controller: it defines no control"),
         ("\n1 / 0\n", r"law.py:2: it fails while it loads: .*ZeroDivisionError"),
         ("get_ipython()\n", r"law.py:1: .*a notebook that was saved as Python has such lines: remove them"),
+        (
+            '{"cells": [], "nbformat": 4, "x": null}\n',
+            "law.py: it is a notebook with the ending .py; hand it in as .ipynb",
+        ),
+        ("raise PermissionError\n", r"law.py:1: .*where files are graded there is no network, which asyncio.run\(\)"),
         ("params = {'a': 1}\ndef control(t, r, y, state, params):\n    return 0.0, ()\n", "unknown parameter 'gain'"),
     ],
 )

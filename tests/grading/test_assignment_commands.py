@@ -85,6 +85,8 @@ def test_off_is_off_and_a_file_must_be_there(tmp_path: Path) -> None:
     folder = assignment_in(tmp_path, HEAD + SINE + RMS)
     ran = rds("self", folder, tmp_path / "nothing.py", "--trust-my-file")
     assert ran.exit_code == 2 and "no such file" in ran.output
+    ran = rds("self", folder, tmp_path, "--trust-my-file")
+    assert ran.exit_code == 2 and "it is a folder, or no regular file" in ran.output
     ran = rds("self", folder / "solution.py", folder, "--trust-my-file")
     assert ran.exit_code == 2 and "it is no assignment; name the folder with assignment.toml first" in ran.output
 

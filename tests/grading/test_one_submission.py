@@ -108,6 +108,15 @@ def test_a_pipe_is_what_the_student_handed_in_and_no_failure_of_the_grader(besid
     assert beside or "it is a pipe (FIFO)" in data["output"]
 
 
+@needs_sandbox
+def test_a_file_that_would_fill_the_disk_is_not_copied(tmp_path: Path) -> None:
+    root = container_in(tmp_path, "gradescope")
+    data = root / CONTAINERS["gradescope"].submission / "data.bin"
+    data.touch()
+    os.truncate(data, 1 << 40)
+    assert json.loads(grade_in("gradescope", root).read_text())["score"] == pytest.approx(9.0)
+
+
 @pytest.mark.parametrize("folder", ["Abgaben/Lovelace_Ada_ada_1234", "Submissions/Team 3", "2026-01-05-10-12-33"])
 @pytest.mark.parametrize(("platform", "student"), [("gradescope", "ada@x.edu"), ("prairielearn", "variant-12345")])
 def test_nobody_is_another_student_by_the_names_of_folders(

@@ -12,6 +12,7 @@ from rds.core.load import load_student
 from rds.core.types import ArcSegment, LineSegment, Reference
 from rds.grading.grade import Status
 from rds.grading.sandbox import Limits, Pool, SubmissionError
+from rds.grading.sandbox.inside.worker import _callable_names
 from rds.models.student import student_model
 from rds.modes.parts import start
 
@@ -356,3 +357,10 @@ def test_who_runs_an_experiment_while_the_file_is_loaded_is_told_what_to_do(
     text = "from rds import Experiment\nfound = Experiment(controller='p')\n"
     with pytest.raises(SubmissionError, match=r'line 2.*move what runs experiments under `if __name__ == "__main__"'):
         pool.open(written(text))
+
+
+def test_a_function_is_found_beside_whatever_is_imported() -> None:
+    """Star imports of numpy, scipy and the like bring more than a thousand names; `rise_time` comes late in them."""
+    variables = {"__name__": "submission", **{f"a{k}": len for k in range(1500)}}
+    exec("def rise_time(tau): return 2.2 * tau", variables)
+    assert "rise_time" in _callable_names(variables) and len(_callable_names(variables)) == 1000

@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rds.core.parallel.outcome import Failure, Outcome
 from rds.grading.assignment.assignment import read_assignment
-from rds.grading.batch.alike import Behaviour, earlier_files
+from rds.grading.batch.alike import Behaviour, _read, earlier_files
 from rds.grading.batch.similarity import (
     GRAM,
     LEAST_COMMON,
@@ -21,7 +22,9 @@ from rds.grading.batch.similarity import (
     WINDOW,
     Fingerprints,
     Program,
+    Uncompared,
     fingerprints,
+    fingerprints_and_text,
     identical_files,
     same_loops,
     similar_pairs,
@@ -207,3 +210,19 @@ def test_files_of_two_years_in_folders_of_one_name_are_both_compared(tmp_path: P
         f"{place}/ada": place.parent.name.encode() for place in places
     }
     assert list(earlier_files(read, places[:1])) == ["submitted/ada"]
+
+
+def test_a_copy_in_a_text_that_is_run_is_told() -> None:
+    """It has no structure to compare, so no pair shows it."""
+    hidden = b"import re\nPATTERN = re.compile('a')\nCODE = 'x = 1'\nexec(CODE)\nrun = eval\n"
+    assert fingerprints_and_text(hidden)[1] == ((4, 5),)
+    assert fingerprints_and_text(LAW.encode())[1] == ()
+    done = [
+        Outcome(0, ({}, ((4, 5),))),
+        Outcome(1, ({1: (1, 1)}, ())),
+        Outcome(2, failure=Failure.DIED, reason="it <died>"),
+    ]
+    found = [left_out for *_, left_out in _read(["ada", "bob", "cid"], iter(done))]
+    assert found == [Uncompared("ada", ((4, 5),)), None, Uncompared("cid", (), "it <died>")]
+    shown = found_html(json.loads(alike_json([], uncompared=[each for each in found if each])))
+    assert "4–5" in shown and "runs text" in shown and "it &lt;died&gt;" in shown and "bob" not in shown

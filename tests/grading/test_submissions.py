@@ -196,6 +196,21 @@ def test_canvas_s_zip(tmp_path: Path) -> None:
     assert found["c_113"].read() == b"underscores"
 
 
+@pytest.mark.parametrize(
+    ("form", "students"),
+    [
+        ("{0}_11{1}_900{1}_{2}", ["ada_110", "bob_111", "eve_112"]),
+        ("Task 1_{0}_attempt_2026-01-09-10-00-00_{2}", ["ada", "bob", "eve"]),
+        ("11{1}-678 - {0} - Jan 5, 2026 1012 AM - {2}", ["ada_110", "bob_111", "eve_112"]),
+    ],
+    ids=["canvas", "blackboard", "brightspace"],
+)
+def test_who_names_files_as_moodle_does_decides_for_nobody_else(form: str, students: list[str], tmp_path: Path) -> None:
+    files: dict[str, str | bytes] = {form.format(*who, "controller.py"): "own" for who in [("ada", 0), ("bob", 1)]}
+    files |= {form.format("eve", 2, f"x_1_assignsubmission_file_{n}.py"): "own" for n in range(9)}
+    assert list(of(zipped(tmp_path / "all.zip", files))) == students
+
+
 def test_blackboard_s_zip_has_the_newest_attempt_of_each_student(tmp_path: Path) -> None:
     files: dict[str, str | bytes] = {
         "Task 1_ada_attempt_2026-01-09-10-00-00.txt": "Name: Ada (ada)",

@@ -166,6 +166,7 @@ def test_code_that_python_cannot_read_is_kept_for_its_message() -> None:
         (b"\xff", "not UTF-8"),
         (b"{", "no notebook"),
         (b"[" * 100_000, "no notebook"),
+        (b"def control(t, r, y, state, params):", "if it is Python, hand it in as .py"),
         (b"[]", "format 4"),
         (b'{"worksheets": []}', "format 4"),
         (b'{"cells": []}', "no code"),

@@ -75,7 +75,8 @@ def self_check(assignment: Assignment, file: Path, student: str, pool: Opener) -
     if assignment.self_check == "off":
         raise InputError("this assignment has no self-check", str(assignment.folder))
     if not file.is_file():
-        raise InputError("there is no such file; name the file that you want to hand in", str(file))
+        said = "it is a folder, or no regular file" if file.exists() else "there is no such file"
+        raise InputError(f"{said}; name the file that you want to hand in", str(file))
     is_blind = assignment.self_check == "blind"
     tried = [
         criterion

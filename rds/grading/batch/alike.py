@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.parallel import spread
+from rds.core.parallel import Outcome, spread
 from rds.core.parallel.reader_process import confine
 from rds.core.parallel.scheduler import Scheduler
 from rds.grading.assignment.assignment import Assignment
@@ -26,9 +25,12 @@ from rds.grading.batch.record import FILE as RECORD
 from rds.grading.batch.similarity import (
     Fingerprints,
     Identical,
+    Lines,
     Pair,
+    Program,
     SameLoop,
-    fingerprints,
+    Uncompared,
+    fingerprints_and_text,
     identical_files,
     same_loops,
     similar_pairs,
@@ -48,6 +50,7 @@ class SimilarityReport:
     pairs: list[Pair] = field(default_factory=list)
     identical: list[Identical] = field(default_factory=list)
     loops: list[SameLoop] = field(default_factory=list)
+    uncompared: list[Uncompared] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,27 +113,43 @@ def alike(
     parsed = {name: code for name, code in own.items() if name.endswith(".py")}
     codes = [*parsed.values(), *(code for _, code in given), *others.values()]
     pairs: list[Pair] = []
+    uncompared: list[Uncompared] = []
     if len(given) + len(others) > 1:  # else a process less to start, which is what one submission's time goes into
-        done = (outcome.value or {} for outcome in spread(_prints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE))
-        sources = dict(zip(parsed, islice(done, len(parsed)), strict=True))
+        done = spread(_prints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE)
+        sources = {name: prints for name, prints, _ in _read(parsed, done)}
         template = sources.pop(assignment.template or "", {})
-        found = zip((student for student, _ in given), islice(done, len(given)), strict=True)
-        pairs = similar_pairs(found, [template], sources, zip(others, done, strict=True))
+
+        def found() -> Iterator[Program]:
+            for student, prints, left_out in _read([student for student, _ in given], done):
+                uncompared.extend([left_out] if left_out else [])
+                yield student, prints
+
+        theirs = ((name, prints) for name, prints, _ in _read(others, done))
+        pairs = similar_pairs(found(), [template], sources, theirs)
     hashes = {each.row.student: each.sha256 for each in rows}
-    theirs = {name: hashlib.sha256(code.read()).hexdigest() for name, code in (own | others).items()}
+    sums = {name: hashlib.sha256(code.read()).hexdigest() for name, code in (own | others).items()}
     return SimilarityReport(
         pairs,
-        identical_files({student: hashes[student] for student, _ in given}, theirs),
+        identical_files({student: hashes[student] for student, _ in given}, sums),
         same_loops(
             {student: each.runs for student, each in behaviours.items()},
             _run(assignment, others, jobs, scheduler) | _solution(assignment, behaviours),
         ),
+        uncompared,
     )
 
 
-def _prints(code: Spooled) -> Fingerprints:
+def _prints(code: Spooled) -> tuple[Fingerprints, tuple[Lines, ...]]:
     confine(MEMORY)
-    return fingerprints(code.read())
+    return fingerprints_and_text(code.read())
+
+
+def _read(names: Iterable[str], done: Iterator[Outcome]) -> Iterator[tuple[str, Fingerprints, Uncompared | None]]:
+    """By name the fingerprints of the next of `done`, and what is not compared of it."""
+    for name in names:
+        outcome = next(done)
+        prints, lines = outcome.value if outcome.ok else ({}, ())
+        yield name, prints, Uncompared(name, lines, outcome.reason) if lines or not outcome.ok else None
 
 
 def _can_tell(assignment: Assignment) -> bool:

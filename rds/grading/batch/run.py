@@ -117,7 +117,7 @@ def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how:
             how.announce(f"{len(rows) - len(todo)} of {len(rows)} submissions are graded already")
         batch.go(todo)
         found = alike(read, rows, batch.behaviours(), how.against, how.jobs, how.scheduler)
-        write_whole(out / SIMILARITY, alike_json(found.pairs, found.identical, found.loops))
+        write_whole(out / SIMILARITY, alike_json(found.pairs, found.identical, found.loops, found.uncompared))
         count = len(todo)
         del batch, todo, rows, intake, record, found  # or a class would be in memory twice
         grades = publish(out, read).measured

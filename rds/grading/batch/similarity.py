@@ -34,6 +34,7 @@ LEAST_COMMON = 6  # fingerprints; less is chance
 _CLASS = 12  # submissions from which on what many share is taken for common knowledge
 _MANY = 0.5
 _CACHE = 256  # kB
+_RUN_TEXT = frozenset({"exec", "eval", "compile"})
 _KEPT = 1000  # ranges of lines: where many are alike, most have the same in common
 
 Lines = tuple[int, int]  # first and last
@@ -62,6 +63,15 @@ class Identical:
     students: tuple[str, ...]
     sha256: str
     source: str = ""
+
+
+@dataclass(frozen=True)
+class Uncompared:
+    """A student whose program is not compared, or not all of it: the lines that run text, or why it was not read."""
+
+    student: str
+    lines: tuple[Lines, ...] = ()
+    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -102,16 +112,22 @@ def identical_files(given: Mapping[str, str], own: Mapping[str, str]) -> list[Id
 
 
 def fingerprints(code: bytes) -> Fingerprints:
-    """The fingerprints of a Python file with the lines each comes from; none if Python cannot read it.
+    """The fingerprints of a Python file with the lines each comes from; see `fingerprints_and_text`."""
+    return fingerprints_and_text(code)[0]
 
-    Parses what somebody wrote: call it in a process that may crash.
+
+def fingerprints_and_text(code: bytes) -> tuple[Fingerprints, tuple[Lines, ...]]:
+    """The fingerprints of a Python file, and the lines that run text (`exec`): what that is has no structure here.
+
+    Each with the lines that it comes from; none if Python cannot read the file. Parses what somebody wrote: call it in
+    a process that may crash.
     """
     limit = sys.getrecursionlimit()
     sys.setrecursionlimit(2 * limit)  # what could be read where it was graded can be here, deeper in the stack
     try:
         tree = ast.parse(code)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return {}
+        return {}, ()
     finally:
         sys.setrecursionlimit(limit)
     words: list[tuple[str, int]] = []
@@ -125,7 +141,12 @@ def fingerprints(code: bytes) -> Fingerprints:
         # the rightmost of the smallest, as in the paper: neighbouring windows then choose the same
         value, lines = min(reversed(grams[n : n + WINDOW]), key=lambda gram: gram[0])
         chosen.setdefault(value, lines)
-    return chosen
+    return chosen, _lines_that_run_text(tree)
+
+
+def _lines_that_run_text(tree: ast.AST) -> tuple[Lines, ...]:
+    names = (node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in _RUN_TEXT)
+    return _joined((node.lineno, node.lineno) for node in names)
 
 
 def similar_pairs(

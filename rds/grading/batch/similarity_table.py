@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from rds.grading.batch.similarity import LEAST_SCORE, Identical, Lines, Pair, SameLoop
+from rds.grading.batch.similarity import LEAST_SCORE, Identical, Lines, Pair, SameLoop, Uncompared
 from rds.grading.feedback.plain_text import one_line
 from rds.results.html import table
 
@@ -19,6 +19,10 @@ _NOTE = (
     "the template or half of the class have too is left out. Short programs are often alike by themselves: this is "
     "where to look, and no finding. No points depend on it."
 )
+_UNCOMPARED = (
+    "What a program runs by exec, eval or compile stands in a text, which may come from somebody else's program and is "
+    "not compared. Read these lines."
+)
 _LOOPS = (
     "In all cases that are the same for everybody these runs are equal to the last bit, whatever the programs look "
     "like. Who takes the same simple law with the same gains has them too: it is where to look, and no finding."
@@ -26,12 +30,12 @@ _LOOPS = (
 
 
 def found_html(found: Mapping[str, Any]) -> str:
-    """What `alike_json` holds: who handed in the same file, whose loops are the same, and the most alike programs."""
-    return (
-        _same(found.get("identical", ())) + _loops(found.get("loops", ())) + _alike(found.get("pairs", ()))
-        if found
-        else ""
-    )
+    """What `alike_json` holds: who handed in the same file, whose loops are the same, the most alike programs; and
+    whose are not compared."""
+    if not found:
+        return ""
+    same = _same(found.get("identical", ())) + _loops(found.get("loops", ())) + _alike(found.get("pairs", ()))
+    return same + _uncompared(found.get("uncompared", ()))
 
 
 def _same(identical: Sequence[Mapping[str, Any]]) -> str:
@@ -46,6 +50,16 @@ def _loops(loops: Sequence[Mapping[str, Any]]) -> str:
         return ""
     rows = [[len(group["students"]), _names(group["students"]), _names(group["others"]) or "–"] for group in loops]
     return table(["students", "the same closed loop, to the last bit", "as have"], rows, "", _LOOPS)
+
+
+def _uncompared(uncompared: Sequence[Mapping[str, Any]]) -> str:
+    if not uncompared:
+        return ""
+    rows = [
+        [one_line(each["student"], _NAME), _ranges(each["lines"]) or "all", one_line(each["why"]) or "runs text"]
+        for each in uncompared
+    ]
+    return table(["student", "lines that are not compared", "why"], rows, "", _UNCOMPARED)
 
 
 def _names(names: Sequence[str]) -> str:
@@ -81,9 +95,15 @@ def _alike(pairs: Sequence[Mapping[str, Any]]) -> str:
     return f"<details{is_open}><summary>{summary}</summary>{table(heads, rows, '', note)}</details>"
 
 
-def alike_json(pairs: Sequence[Pair], identical: Sequence[Identical] = (), loops: Sequence[SameLoop] = ()) -> bytes:
-    """All pairs, with their ranges of lines, who handed in the same file, and whose loops are the same."""
-    parts: dict[str, Sequence[Any]] = {"identical": identical, "loops": loops, "pairs": pairs}
+def alike_json(
+    pairs: Sequence[Pair],
+    identical: Sequence[Identical] = (),
+    loops: Sequence[SameLoop] = (),
+    uncompared: Sequence[Uncompared] = (),
+) -> bytes:
+    """All pairs, with their ranges of lines, who handed in the same file, whose loops are the same, and who is not
+    compared."""
+    parts: dict[str, Sequence[Any]] = {"identical": identical, "loops": loops, "pairs": pairs, "uncompared": uncompared}
     whole = {name: [asdict(each) for each in found] for name, found in parts.items()}
     return json.dumps(whole, indent=1).encode() + b"\n"
 

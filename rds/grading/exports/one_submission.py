@@ -31,6 +31,8 @@ from rds.grading.exports.exported import ExportOptions
 from rds.grading.grade import Grade, Status
 from rds.grading.intake.items import DEEPEST
 from rds.grading.intake.layouts import TIMES
+from rds.grading.intake.names import shown
+from rds.grading.intake.notebooks import LARGEST
 
 RESULTS = "results/results.json"
 
@@ -83,7 +85,7 @@ def grade_in(platform: str, root: Path) -> Path:
 def _grade(container: Container, platform: str, root: Path, target: Path) -> None:
     about = json.loads((root / container.about).read_bytes())
     student, time = container.who(about)
-    student = student.replace("/", "_") or "student"
+    student = student.strip().replace("/", "_") or "student"
     with scratch("one") as work:
         # one folder more: none of the student's own is called as a platform's would be, and makes a student of its name
         folder = work / "submissions" / student / "submission"
@@ -91,7 +93,7 @@ def _grade(container: Container, platform: str, root: Path, target: Path) -> Non
         shutil.copytree(given, folder, symlinks=True, copy_function=_copied, ignore=partial(_too_deep, given))
         if time:
             with open_private(work / "submissions" / TIMES, "w", newline="", encoding="utf-8") as stream:
-                csv.writer(stream).writerows([["student", "timestamp"], [student, time]])
+                csv.writer(stream).writerows([["student", "timestamp"], [shown(student), time]])
         run_batch(root / container.assignment, work / "submissions", work / "out", jobs=1)
         export(work / "out", platform, target, ExportOptions())
 
@@ -102,9 +104,16 @@ def _too_deep(given: Path, folder: str, names: list[str]) -> list[str]:
 
 
 def _copied(source: str, target: str) -> None:
-    """A file's copy. What is none, as a FIFO, is made again empty, so that its author hears what was handed in."""
-    kind = stat.S_IFMT(os.lstat(source).st_mode)
-    if kind == stat.S_IFREG:
+    """A file's copy. What is none, as a FIFO, is made again empty, so that its author hears what was handed in.
+
+    So is a file larger than any that is read, which could fill the disk: it keeps its size, and takes no room.
+    """
+    about = os.lstat(source)
+    kind = stat.S_IFMT(about.st_mode)
+    if kind == stat.S_IFREG and about.st_size > LARGEST:
+        with open_private(Path(target), "wb") as file:
+            file.truncate(about.st_size)
+    elif kind == stat.S_IFREG:
         shutil.copy2(source, target)
     else:
         os.mknod(target, kind | 0o600)

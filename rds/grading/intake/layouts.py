@@ -99,13 +99,14 @@ def sorted_out(
         for name in folders:
             sorting.files_of_gradescope(name, submitters)
         return sorting.layout("gradescope", times)
-    if _mostly(items, lambda item: _MOODLE.fullmatch(item.parts[0])):
+    platform = _platform(items)
+    if platform == "moodle":
         for item in items:
             sorting.moodle(item)
         for name in folders:
             sorting.files_of_moodle(name)
         return sorting.layout("moodle", times)
-    if _mostly(items, lambda item: _BRIGHTSPACE.fullmatch(item.parts[0])):
+    if platform == "brightspace":
         sorting.brightspace(items, folders)
         return sorting.layout("brightspace", times)
     if _is_vpl(items):
@@ -114,11 +115,11 @@ def sorted_out(
         for name in folders:
             sorting.files_of_vpl(name)
         return sorting.layout("vpl", times)
-    if _mostly(items, lambda item: len(item.parts) == 1 and _CANVAS.fullmatch(item.name)):
+    if platform == "canvas":
         for item in items:
             sorting.canvas(item)
         return sorting.layout("canvas", times)
-    if _mostly(items, lambda item: len(item.parts) == 1 and _BLACKBOARD.fullmatch(item.name)):
+    if platform == "blackboard":
         sorting.blackboard(items)
         for student in folders:
             sorting.files_of(student)
@@ -369,10 +370,21 @@ def _is_one_s_name(folder: str) -> bool:
     return any(each.fullmatch(folder) for each in (_MOODLE_FOLDER, _BRIGHTSPACE))
 
 
-def _mostly(items: Sequence[Item], fits: Any) -> bool:
-    """Of the files that may be submissions more than half; one with a strange name changes nothing."""
+def _platform(items: Sequence[Item]) -> str:
+    """The platform that calls most of the files that may be submissions so, and more than half; empty if none does.
+
+    Of two, the one that fits more of them: what a name ends with is the student's choice, and could be what another
+    platform writes, but only in that student's own files.
+    """
     counted = [item for item in items if item.is_code or item.is_archive]
-    return 2 * sum(1 for item in counted if fits(item)) > len(counted)
+    fits = {
+        "moodle": sum(bool(_MOODLE.fullmatch(item.parts[0])) for item in counted),
+        "brightspace": sum(bool(_BRIGHTSPACE.fullmatch(item.parts[0])) for item in counted),
+        "canvas": sum(len(item.parts) == 1 and bool(_CANVAS.fullmatch(item.name)) for item in counted),
+        "blackboard": sum(len(item.parts) == 1 and bool(_BLACKBOARD.fullmatch(item.name)) for item in counted),
+    }
+    best = max(fits, key=lambda name: fits[name])
+    return best if 2 * fits[best] > len(counted) else ""
 
 
 def _is_vpl(items: Sequence[Item]) -> bool:

@@ -113,7 +113,7 @@ def _code_cells(data: bytes) -> list[str]:
     except UnicodeDecodeError:
         raise Refusal("the notebook is not UTF-8 text") from None
     except (ValueError, RecursionError) as error:
-        raise Refusal(f"it is no notebook: {str(error)[:200]}") from None
+        raise Refusal(f"it is no notebook: {str(error)[:200]}; if it is Python, hand it in as .py") from None
     if not isinstance(whole, dict) or not isinstance(whole.get("cells"), list):
         raise Refusal("it is no notebook of format 4; open and save it in JupyterLab")
     found = []

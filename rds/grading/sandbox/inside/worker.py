@@ -7,10 +7,10 @@ import importlib.util
 import locale
 import random
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any, TextIO
 
 import numpy as np
@@ -31,6 +31,7 @@ from rds.grading.sandbox.shared_channel import ChannelClosed
 _RUNS = {"control": runs.control, "model": runs.model, "rows": runs.rows}
 _OWN = ("rds.checks.rows", "rds.core.types", "rds.core.values", "rds.machines.converter", "rds.modes.loop.laws")
 """Modules that ask a submission at each sample, besides `runs`: their work is not the submission's."""
+_MOST_NAMES = 1000  # that are told of a file
 
 
 def main(questions: int, answers: int, door: list[int]) -> int:
@@ -139,16 +140,23 @@ def _load(channel: Channel, kind: str, file: Path, count: RunCount | None) -> St
         return None
     given = loaded if isinstance(loaded, StudentFile) else None
     found = given.functions if given else vars(loaded)
-    names = sorted(n for n, v in found.items() if isinstance(n, str) and callable(v) and n[:1] not in ("", "_"))
     params, fault = _shown(lambda: dict(given.params) if given else {})
     state, state_fault = _shown(lambda: given.initial_state if given else None)
     problem = "; ".join(f"{name}: {text}" for name, text in [("params", fault), ("initial_state", state_fault)] if text)
-    told = {"defines": names[:1000], "params": params or {}, "initial_state": state, "problem": problem}
+    told = {"defines": _callable_names(found), "params": params or {}, "initial_state": state, "problem": problem}
     try:
         channel.tell(told)
     except FrameError as error:  # texts without end; it can be used all the same
         channel.tell({"defines": [], "params": {}, "initial_state": None, "problem": f"what it defines: {error}"})
     return loaded
+
+
+def _callable_names(found: Mapping[str, Any]) -> list[str]:
+    """What can be called in it, by name; of very much, what is imported (`from numpy import *`) is left out first."""
+    names = [n for n, v in found.items() if isinstance(n, str) and callable(v) and n[:1] not in ("", "_")]
+    file = found.get("__name__")
+    own = {name for name in names if type(found[name]) is FunctionType and found[name].__module__ == file}
+    return sorted(sorted(names, key=lambda name: (name not in own, name))[:_MOST_NAMES])
 
 
 def _interface(kind: str, file: Path) -> StudentFile:
