@@ -74,6 +74,8 @@ def written(folder: Path, name: str, head: str, columns: Sequence[np.ndarray], m
         ("in/out", "in/out", None),
         ("pos/furlong", "pos/furlong", None),
         ("u, filtered", "u, filtered", None),
+        ("pos [mm] (filtered)", "pos (filtered)", "mm"),
+        ("pos（mm）", "pos", "mm"),
         ("ms", "ms", "ms"),  # a drive's column of times, headed by its unit
         ("s", "s", None),  # a way, as often as a time
     ],
@@ -375,11 +377,34 @@ def test_the_time_in_the_first_row_of_a_matrix_of_simulink_is_offered(tmp_path: 
         ("time [s],Voltage [V],Position Difference [mm]", "position"),
         ("time [s],Bus Voltage [V],Position [mm]", "command"),
         ("time [s],Supply Voltage [V],Speed [rpm]", "command"),
+        ("time [s],DC-Link [V],Position [mm]", "command"),
+        ("time [s],Tacho [V],Position [mm]", "command"),
+        ("time [s],Analog input 1 [V],Position [mm]", "command"),
+        ("time [s],Peak current limit [A],Position [mm]", "command"),
+        ("time [s],Torque limit [Nm],Position [mm]", "command"),
+        ("time [s],Load torque [Nm],Position [mm]", "command"),
+        ("time [s],Torque [Nm],Z offset [mm]", "position"),
+        ("time [s],Voltage [V],Electrical angle [deg]", "position"),
     ],
 )
 def test_what_was_not_measured_or_drives_nothing_is_not_guessed(tmp_path: Path, head: str, quantity: str) -> None:
     with pytest.raises(InputError, match=f"no column tells by its unit that it is the {quantity}"):
         read_log(written(tmp_path, "log.csv", head + "\n", [0.001 * T, U, X], ","))
+
+
+def test_the_motor_s_current_is_the_command_beside_the_voltage_of_its_supply(tmp_path: Path) -> None:
+    head = "time [s],DC link voltage [V],Motor current [A],Position [mm],Current limit [A]\n"
+    (log,) = read_log(written(tmp_path, "log.csv", head, [0.001 * T, 0.0 * X + 560.0, U, X, 0.0 * X + 9.0], ","))
+    assert np.allclose(log.command, U, atol=1e-5) and log.units["command"] == "A"
+    assert "current" not in log.extra
+
+
+def test_a_heading_with_fewer_names_than_columns_is_told(tmp_path: Path) -> None:
+    """As R writes a table whose rows have names."""
+    table = read_table(written(tmp_path, "log.csv", "t [s],u [V],x [mm]\n", [T + 1.0, 0.001 * T, U, X], ","))
+    assert list(table.columns) == [f"column {i}" for i in (1, 2, 3, 4)]
+    (told,) = [f.what for f in table.findings if f.kind == "headings"]
+    assert "fewer cells ('t [s],u [V],x [mm]') than the rows, 4" in told
 
 
 def test_a_command_position_beside_the_measured_one_is_the_reference(tmp_path: Path) -> None:
@@ -393,7 +418,11 @@ def test_signals_that_follow_each_other_in_rows_are_told_how_to_turn(tmp_path: P
     path = tmp_path / "log.csv"
     rows = (f"{name},{0.001 * k:.3f},{k}" for k in range(200) for name in ("position", "voltage"))
     path.write_text("name,time [s],value\n" + "\n".join(rows) + "\n")
-    with pytest.raises(InputError, match=r"pivot\(index='time', columns='name', values='value'\)"):
+    with pytest.raises(InputError, match=r"pivot\(index=c\[1\], columns=c\[0\], values=c\[2\]\)"):
+        read_log(path)
+    rows = (f"{name},{0.001 * k:.3f},{k}" for name in ("position", "voltage") for k in range(200))
+    path.write_text("_field,_time [s],_value\n" + "\n".join(rows) + "\n")  # as InfluxDB exports them
+    with pytest.raises(InputError, match=r"pivot\(index=c\[1\], columns=c\[0\], values=c\[2\]\)"):
         read_log(path)
     rows = (f"{name} 2024-05-01 12:00:{0.01 * k:09.6f} {k}" for k in range(200) for name in ("Axis1-PosAct", "Enc"))
     path.write_text("\n".join(rows) + "\n")  # as EPICS's camonitor prints them

@@ -20,7 +20,9 @@ BLANKS = frozenset(
         *("-1.#ind", "1.#qnan", "1.#inf", "-1.#inf", "-nan(ind)", "nan(ind)"),  # of C on Windows
     )
 )
-DATE = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+DATE = re.compile(
+    r"(\d{4}-\d\d-\d\d|\d{4}/\d\d/\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?"
+)
 CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
 # before each line that a terminal shows: `16:20:01.123 -> ` of the Arduino IDE, `[2024-01-01 16:20:01.123] ` of others
 _DAY = r"(?:\d{4}-\d\d-\d\d[ T]|\w{3} \w{3} [ \d]\d )?"

@@ -26,6 +26,7 @@ _NO_UNITS = (
     *("setpoint", "set", "demand", "desired", "target", "commanded", "command", "reference", "ref", "soll"),
     *("measured", "actual", "act", "feedback", "ist"),
 )
+_WIDE_BRACKETS = str.maketrans("（）［］｛｝", "()[]{}")  # of Chinese and Japanese keyboards
 _BETWEEN = re.compile(r"\s*[/,]\s*|\s+[iI][nN]\s+")  # a name and its unit
 _SCALES = (("scalefactor", "1"), ("offset", "0"), ("unit scalefactor", "1"), ("unit offset", "0"))
 _LEAST_TIMES = 2  # columns of times, but in an export of TwinCAT's scope
@@ -68,9 +69,14 @@ def alternates(units: Sequence[str | None]) -> bool:
 
 def name_and_unit(cell: str) -> tuple[str, str | None]:
     """Name and unit of a heading; None where it gives none. Without brackets a unit must be one that is known."""
+    cell = cell.translate(_WIDE_BRACKETS)
     name, unit = split_heading(cell)
     if unit is not None and unit.casefold() in _NO_UNITS:
         return cell.strip(), None  # `x (setpoint)`
+    if unit is not None and dimension(unit) is None:
+        own, known = split_heading(name)
+        if known is not None and dimension(known) is not None:
+            return f"{own} ({unit})", known  # `pos [mm] (filtered)`
     if unit is not None or name in _TIMES_ALONE:
         return name, unit or name
     if cell.startswith("in ") and dimension(cell[3:]) == "time":

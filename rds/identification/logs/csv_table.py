@@ -30,6 +30,7 @@ _BLOCK = 1 << 22  # bytes
 _TAIL = 1 << 14  # bytes at the end in which a cut is looked for
 _REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")
 _DOTTED_DATE = re.compile(rb"(?<![\d.])(\d\d)\.(\d\d)\.(\d{4})[T ](?=\d\d:\d\d)")  # the day is first, always
+_SLASHED_DATE = re.compile(rb"(?<![\d/])(\d{4})/(\d\d)/(\d\d)(?=[T ]\d\d:\d\d)")  # of Japanese controls
 _COMMA_TIME = re.compile(rb"(?<!\d)(\d\d:\d\d:\d\d),(\d)")
 _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 _DAY = 86400.0  # s
@@ -129,6 +130,10 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
         what = f"no cells stand below {', '.join(map(repr, layout.surplus[:8]))} in the heading, which is wider than "
         gravity = Gravity.NOTE if layout.surplus == ("Comment",) else Gravity.WARNING  # LabVIEW's, which is often empty
         findings.append(Finding("headings", what + "the rows; the others were taken from the left", gravity))
+    if layout.short:
+        what = f"the line above the data has fewer cells ({layout.short[:60]!r}) than the rows, {len(names)}: nothing "
+        what += "tells which names go with which columns; write one for each (in R by col.names = NA)"
+        findings.append(Finding("headings", what, Gravity.WARNING))
     columns = {}
     for at, (name, unit) in enumerate(zip(names, layout.units, strict=True)):
         if at < layout.beside:
@@ -296,6 +301,7 @@ class _Rows:
             data, remarks = _REMARK.subn(b"", data)
             self.remarks += remarks
             if self._stamped:  # as Germans and Python's logging write them
+                data = _SLASHED_DATE.sub(rb"\1-\2-\3", data)
                 data = _DOTTED_DATE.sub(rb"\3-\2-\1 ", data)
                 data = data if self._delimiter == b"," else _COMMA_TIME.sub(rb"\1.\2", data)
             if self._spaces:
