@@ -11,6 +11,7 @@ from scipy.io import savemat
 
 from rds.core.errors import InputError
 from rds.identification.logs.csv_headings import name_and_unit
+from rds.identification.logs.guess import draft
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.tables import read_table
 from rds.identification.logs.units import dimension, unit_of_name
@@ -368,6 +369,14 @@ def test_the_time_in_the_first_row_of_a_matrix_of_simulink_is_offered(tmp_path: 
     savemat(tmp_path / "log.mat", {"yaw_speed": np.array([0.001 * T, U])})
     with pytest.raises(InputError, match="where the time is 'yaw_speed_1', say so in a map"):
         read_log(tmp_path / "log.mat")
+    assert '[time]\ncolumn = "yaw_speed_1"\nunit = "?"' in draft(read_table(tmp_path / "log.mat"))
+
+
+def test_dspace_s_x_is_drafted_as_the_time(tmp_path: Path) -> None:
+    signals = np.array([("u", U), ("speed", X)], dtype=[("Name", "O"), ("Data", "O")])
+    savemat(tmp_path / "log.mat", {"run": {"X": {"Data": 0.001 * T}, "Y": signals}})
+    made = draft(read_table(tmp_path / "log.mat"))
+    assert '[time]\ncolumn = "run.X.Data"\nunit = "?"' in made and made.count("run.X.Data") == 2
 
 
 @pytest.mark.parametrize(

@@ -124,6 +124,8 @@ def draft(table: Table) -> str:
     named = next((c.name for c in columns if _role(c.name) == "time"), None)
     if named is None and not any(c.unit or _role(c.name) for c in columns):
         named = next((c.name for c in columns if _rises(c.values)), None)
+    elif named is None and len(offered := _perhaps_times(columns)) == 1:
+        named = offered[0]  # as dSPACE's X
     if not table.own_times:
         time = time or named
         if time is not None:
@@ -292,14 +294,17 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     kind = next((report for of, report in kinds.items() if of in units), None)
     if kind is not None and (numbered or in_time):
         sentence += f"; such readings are for `rds report {kind}`"
-    rising = [
-        c.name for c in columns if c.unit is None and _rises(c.values) and (_role(c.name) is None or _is_even(c.values))
-    ]
-    rising = [name for name in rising if name.lower() not in _ORDINALS]
+    rising = _perhaps_times(columns)
     if kind is None and rising:
         named = ", ".join(map(repr, rising[:3])) + (" ..." if len(rising) > 3 else "")
         sentence += f"; where the time is {named}, say so in a map, with its unit: column and unit under [time]"
     return sentence + "; if its rows are equally spaced in time, say so in a map: rate = ... (in Hz) under [time]"
+
+
+def _perhaps_times(columns: Sequence[Column]) -> list[str]:
+    """The columns that nothing calls a time, and that go up as one does."""
+    rising = [c for c in columns if c.unit is None and _rises(c.values) and c.name.lower() not in _ORDINALS]
+    return [c.name for c in rising if _role(c.name) is None or _is_even(c.values)]
 
 
 def _are_alike(a: Column, b: Column) -> bool:
