@@ -359,6 +359,19 @@ def test_two_units_of_one_column_are_told(tmp_path: Path) -> None:
     assert any("the heading says Time in s, and ms below: the heading was followed" in f.what for f in log.findings)
 
 
+def test_a_unit_at_the_end_of_a_name_may_contradict_the_row_of_units(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path, "log.csv", "time_ms,u_V,pos_mm\ns,V,mm\n", [T, U, X], ","))
+    assert any("the heading says time_ms in ms, and s below" in f.what for f in table.findings)
+    assert [c.unit for c in table.columns.values()] == ["ms", "V", "mm"]
+
+
+def test_a_date_and_the_same_time_in_s_are_one_time(tmp_path: Path) -> None:
+    stamps = [f"2024-03-01 12:00:{k / 1000:09.6f}" for k in range(300)]
+    rows = (f"{stamp},{k / 1000},{k % 7},{k}" for k, stamp in enumerate(stamps))
+    (tmp_path / "log.csv").write_text("Timestamp,Time (s),u [V],x [mm]\n" + "\n".join(rows) + "\n")
+    assert read_log(tmp_path / "log.csv")[0].sample_period == pytest.approx(1e-3)
+
+
 def test_a_time_of_another_name_is_offered(tmp_path: Path) -> None:
     head = "ms_today;input_voltage;erpm\n"
     with pytest.raises(InputError, match="where the time is 'ms_today', say so in a map, with its unit"):

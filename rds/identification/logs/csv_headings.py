@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from rds.identification.logs.csv_cells import BLANKS, COMMENTS, is_comment, is_number, split
-from rds.identification.logs.units import dimension, plain
+from rds.identification.logs.units import dimension, plain, unit_of_name
 from rds.results.units import split_heading
 
 Split = Callable[[str], list[str]]
@@ -215,6 +215,8 @@ def headings_above(lines: Sequence[str], first: int, delimiter: str, decimal: st
         name, unit = (cell, None) if cell in numbered else name_and_unit(cell.strip('"'))
         if units[i] is not None and unit is not None and dimension(unit) is None:
             name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
+        if unit is None and units[i] and (own := unit_of_name(name)) and dimension(own) == dimension(units[i] or ""):
+            unit = own  # `time_ms` above `s`
         names.append(f"column {i + 1}" if i in numbers - filled or not name else name)
         if unit and units[i] and dimension(unit) and dimension(units[i] or "") and plain(unit) != plain(units[i] or ""):
             torn.append(f"{name} in {unit}, and {units[i]} below")

@@ -21,6 +21,7 @@ from rds.identification.logs.csv_cells import (
     DATE,
     DELIMITERS,
     are_numbers,
+    has_unit,
     is_comment,
     is_number,
     not_in_utf_8,
@@ -106,6 +107,10 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         if shown.lstrip().startswith(("{", "[{")):
             what, how = ("it is", "") if shown.lstrip().startswith("[") else ("its lines are", ", lines=True")
             remedy = f"{what} JSON: in Python `pandas.read_json(FILE{how}).to_csv('log.csv', index=False)`"
+        if any(all(map(has_unit, cells)) for line in told for cells in [split(line, ",")[1:]] if cells):
+            remedy = (
+                "each cell has its unit in it: export the numbers alone, with the unit in the heading, as in pos [mm]"
+            )
         if any(are_numbers(line.split(":")) for line in lines):
             remedy += "; its cells seem to stand between colons: export it with semicolons between them"
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))

@@ -37,6 +37,7 @@ _DAY = 86400.0  # s
 _WIDE, _TIMES_WIDER = 100, 10  # columns from which, and rows of which, a table lies on its side
 _FILETIME = 1e16  # in steps of 100 ns since 1601: times in ms are below
 _END = b"EOF"  # the last line of an export of TwinCAT's scope
+_DOS_END = b"\x1a"  # of a text, on DOS and on instruments of that time
 _SPELLED = (str.lower, str.upper, str.capitalize)
 _NULLS = [" ", "NaN", "+Inf", "-Inf", *(spelled(word) for word in BLANKS for spelled in _SPELLED)]
 
@@ -71,7 +72,8 @@ def _of_utf_16(path: Path, delimiter: str | None, decimal: str | None, progress:
         try:
             table = _table(copy, delimiter, decimal, progress)
         except InputError as error:
-            raise InputError(str(error).replace(str(copy), str(path))) from error
+            where = (error.where or str(path)).replace(str(copy), str(path))
+            raise InputError(str(error).removeprefix(f"{error.where}: "), where) from error
     said = Finding("encoding", "it is not UTF-8; it was read as utf-16")
     return replace(table, path=path, findings=(said, *table.findings))
 
@@ -411,6 +413,8 @@ def _end(path: Path, layout: Layout) -> tuple[int, Finding | None]:
     *before, last = tail.rstrip(b" \t").split(b"\n")
     if layout.ragged and last.strip() == _END:
         return size, None
+    if before and last.strip() == _DOS_END:
+        return size - len(tail) + tail.rindex(b"\n") + 1, None
     others = [line for line in before[1:] if line.strip()]
     cells = len(split(last.decode(layout.encoding, "replace"), layout.delimiter))
     # rows that end with their channels tell nothing by their length; a \r is no character of a row

@@ -308,7 +308,7 @@ def _perhaps_times(columns: Sequence[Column]) -> list[str]:
 
 
 def _are_alike(a: Column, b: Column) -> bool:
-    return a is b or (a.unit == b.unit and np.array_equal(a.values, b.values, equal_nan=True))
+    return a is b or (a.unit == b.unit and np.allclose(a.values, b.values, rtol=1e-12, atol=1e-9, equal_nan=True))
 
 
 def _rises(values: np.ndarray) -> bool:
@@ -361,7 +361,8 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
         if not fits:
             bare = [c.name for c in measured if c.unit is None]
             doubt = f"no column tells by its unit that it is the {quantity}"
-            strange = [c for c in measured if _is_strange(c) and _role(c.name) in (quantity, None)]
+            roles = (quantity, None, "velocity" if quantity == "position" else None)  # a speed will do
+            strange = [c for c in measured if _is_strange(c) and _role(c.name) in roles]
             doubt += "".join(f"; {c.name!r}: {_unknown(c, quantity)}" for c in strange[:_TOLD])
             if quantity == "command" and (parts := [c for c in measured if dimension(c.unit or "") == "ratio"]):
                 told = " or ".join(f"{c.name} [{c.unit}]" for c in parts[:_TOLD])
