@@ -27,6 +27,19 @@ def test_a_word_among_the_numbers_is_named_with_its_column_and_row(tmp_path: Pat
         read_log(path)
 
 
+def test_cells_with_their_units_are_refused_with_where_units_belong(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("Time,u,pos\n" + "2024-03-01 12:00:00.000,2.0 V,0.5 mm\n" * 30)
+    with pytest.raises(InputError, match=r"each cell has its unit in it: .* in the heading"):
+        describe(tmp_path / "log.csv")
+
+
+def test_the_end_mark_of_dos_is_no_cut_row(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", headed(axis(200)))
+    path.write_bytes(path.read_bytes() + b"\x1a")
+    (log,) = read_log(path)
+    assert len(log) == 200 and not any(finding.kind == "cut" for finding in log.findings)
+
+
 def test_quoted_decimal_commas_between_commas_are_numbers_where_the_map_says_so(tmp_path: Path) -> None:
     made = axis(400)
     path = tmp_path / "log.csv"
@@ -70,6 +83,10 @@ def test_a_heading_that_would_command_the_terminal_is_refused(tmp_path: Path) ->
         ("-1,002", "if this comma parts the thousands, export the file without it"),
         ("1,5", 'if this is a decimal comma, say decimal = "comma"'),
         ("overflow", "repair it or choose another column"),
+        ("20.0%", "a unit in each cell"),
+        ("-1.5 mm/s", "a unit in each cell"),
+        ("\u22122.0", "U+2212"),
+        ("0x1F", "repair it or choose"),
     ],
 )
 def test_what_to_do_about_a_cell(cell: str, words: str) -> None:

@@ -106,7 +106,8 @@ def test_a_date_of_another_age_is_told(tmp_path: Path, unit: str, refused: bool)
 
 
 @pytest.mark.parametrize(
-    "form", ["%d.%m.%Y %H:%M:%S,%f", "%Y-%m-%d %H:%M:%S,%f", "%H:%M:%S,%f", "%d.%m.%Y %H:%M:%S.%f"]
+    "form",
+    ["%Y/%m/%d %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S,%f", "%Y-%m-%d %H:%M:%S,%f", "%H:%M:%S,%f", "%d.%m.%Y %H:%M:%S.%f"],
 )
 def test_dates_of_german_recorders_and_of_logging_are_times(tmp_path: Path, form: str) -> None:
     """`05.04.2024` is never the fourth of May, as a day between points comes first."""

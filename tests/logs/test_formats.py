@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import struct
 from pathlib import Path
@@ -371,6 +372,50 @@ def test_lines_of_json_are_refused_with_what_turns_them_into_a_table(tmp_path: P
     path.write_text('{"t": 0.0, "u": 1.0}\n')
     with pytest.raises(InputError, match="lines=True"):
         read_table(path)
+
+
+OCTAVE = b"# Created by Octave 8.4.0\n" + b"".join(
+    b"# name: %s\n# type: matrix\n# rows: 50\n# columns: 1\n%s\n\n" % (name, b" 0.5\n" * 50) for name in (b"t", b"u")
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("log.csv", gzip.compress(b"t,u\n" + b"1,2\n" * 30), "packed by gzip"),
+        ("log.csv", b"PK\x03\x04" + bytes(40) + b"\n" + bytes(9), "a zip, as spreadsheets"),
+        ("log.txt", b"PAR1" + bytes(40), "it is Parquet: let its name end in .parquet"),
+        ("log.mat", b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n", "git lfs pull"),
+        ("log.csv", b"\n<!DOCTYPE html><html><body>404</body></html>", "a web page, and no data"),
+        ("log.mat", OCTAVE, "save -v7 log.mat t u y"),
+        ("log.txt", OCTAVE, "save -v7 log.mat t u y"),
+        ("log.trc", b"#9000002000WAVEDESC" + bytes(40), "a waveform of an oscilloscope"),
+        ("log.csv.gz", gzip.compress(b"t,u\n" + b"1,2\n" * 30), "only bus logs .*gunzip -k FILE"),
+        ("log.json.gz", gzip.compress(b"{}"), "only bus logs .*gunzip -k FILE"),
+        ("log.log", b"TLOG0003\0" + bytes(range(256)) * 9, "it is not text"),
+        ("log.txt", b'[{"t":0.0,"u":2.0},{"t":0.1,"u":2.0}]', "it is JSON: in Python `pandas.read_json.FILE"),
+    ],
+)
+def test_files_that_are_not_what_their_names_say_are_told(tmp_path: Path, name: str, data: bytes, said: str) -> None:
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError, match=said):
+        read_table(tmp_path / name)
+
+
+def test_one_matrix_of_octave_is_a_table(tmp_path: Path) -> None:
+    (tmp_path / "log.txt").write_bytes(OCTAVE[: OCTAVE.index(b"# name: u")])
+    (column,) = read_table(tmp_path / "log.txt").columns.values()
+    assert len(column.values) == 50
+
+
+def test_times_of_day_in_parquet_are_times(tmp_path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    times = pa.array(1000 * np.arange(300) + 43_200_000_000, pa.time64("us"))
+    parquet.write_table(pa.table({"time": times, "u [V]": np.ones(300)}), tmp_path / "log.parquet")
+    time = read_table(tmp_path / "log.parquet").columns["time"]
+    assert time.unit == "s" and np.allclose(np.diff(time.values), 0.001) and time.values[0] == 43200.0
 
 
 def test_lines_of_json_in_a_text_file_are_told_too(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from scipy.io import savemat
 
 from rds.core.errors import InputError
 from rds.identification.logs.csv_headings import name_and_unit
+from rds.identification.logs.guess import draft
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.tables import read_table
 from rds.identification.logs.units import dimension, unit_of_name
@@ -74,6 +75,8 @@ def written(folder: Path, name: str, head: str, columns: Sequence[np.ndarray], m
         ("in/out", "in/out", None),
         ("pos/furlong", "pos/furlong", None),
         ("u, filtered", "u, filtered", None),
+        ("pos [mm] (filtered)", "pos (filtered)", "mm"),
+        ("pos（mm）", "pos", "mm"),
         ("ms", "ms", "ms"),  # a drive's column of times, headed by its unit
         ("s", "s", None),  # a way, as often as a time
     ],
@@ -356,6 +359,19 @@ def test_two_units_of_one_column_are_told(tmp_path: Path) -> None:
     assert any("the heading says Time in s, and ms below: the heading was followed" in f.what for f in log.findings)
 
 
+def test_a_unit_at_the_end_of_a_name_may_contradict_the_row_of_units(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path, "log.csv", "time_ms,u_V,pos_mm\ns,V,mm\n", [T, U, X], ","))
+    assert any("the heading says time_ms in ms, and s below" in f.what for f in table.findings)
+    assert [c.unit for c in table.columns.values()] == ["ms", "V", "mm"]
+
+
+def test_a_date_and_the_same_time_in_s_are_one_time(tmp_path: Path) -> None:
+    stamps = [f"2024-03-01 12:00:{k / 1000:09.6f}" for k in range(300)]
+    rows = (f"{stamp},{k / 1000},{k % 7},{k}" for k, stamp in enumerate(stamps))
+    (tmp_path / "log.csv").write_text("Timestamp,Time (s),u [V],x [mm]\n" + "\n".join(rows) + "\n")
+    assert read_log(tmp_path / "log.csv")[0].sample_period == pytest.approx(1e-3)
+
+
 def test_a_time_of_another_name_is_offered(tmp_path: Path) -> None:
     head = "ms_today;input_voltage;erpm\n"
     with pytest.raises(InputError, match="where the time is 'ms_today', say so in a map, with its unit"):
@@ -366,6 +382,14 @@ def test_the_time_in_the_first_row_of_a_matrix_of_simulink_is_offered(tmp_path: 
     savemat(tmp_path / "log.mat", {"yaw_speed": np.array([0.001 * T, U])})
     with pytest.raises(InputError, match="where the time is 'yaw_speed_1', say so in a map"):
         read_log(tmp_path / "log.mat")
+    assert '[time]\ncolumn = "yaw_speed_1"\nunit = "?"' in draft(read_table(tmp_path / "log.mat"))
+
+
+def test_dspace_s_x_is_drafted_as_the_time(tmp_path: Path) -> None:
+    signals = np.array([("u", U), ("speed", X)], dtype=[("Name", "O"), ("Data", "O")])
+    savemat(tmp_path / "log.mat", {"run": {"X": {"Data": 0.001 * T}, "Y": signals}})
+    made = draft(read_table(tmp_path / "log.mat"))
+    assert '[time]\ncolumn = "run.X.Data"\nunit = "?"' in made and made.count("run.X.Data") == 2
 
 
 @pytest.mark.parametrize(
@@ -375,11 +399,34 @@ def test_the_time_in_the_first_row_of_a_matrix_of_simulink_is_offered(tmp_path: 
         ("time [s],Voltage [V],Position Difference [mm]", "position"),
         ("time [s],Bus Voltage [V],Position [mm]", "command"),
         ("time [s],Supply Voltage [V],Speed [rpm]", "command"),
+        ("time [s],DC-Link [V],Position [mm]", "command"),
+        ("time [s],Tacho [V],Position [mm]", "command"),
+        ("time [s],Analog input 1 [V],Position [mm]", "command"),
+        ("time [s],Peak current limit [A],Position [mm]", "command"),
+        ("time [s],Torque limit [Nm],Position [mm]", "command"),
+        ("time [s],Load torque [Nm],Position [mm]", "command"),
+        ("time [s],Torque [Nm],Z offset [mm]", "position"),
+        ("time [s],Voltage [V],Electrical angle [deg]", "position"),
     ],
 )
 def test_what_was_not_measured_or_drives_nothing_is_not_guessed(tmp_path: Path, head: str, quantity: str) -> None:
     with pytest.raises(InputError, match=f"no column tells by its unit that it is the {quantity}"):
         read_log(written(tmp_path, "log.csv", head + "\n", [0.001 * T, U, X], ","))
+
+
+def test_the_motor_s_current_is_the_command_beside_the_voltage_of_its_supply(tmp_path: Path) -> None:
+    head = "time [s],DC link voltage [V],Motor current [A],Position [mm],Current limit [A]\n"
+    (log,) = read_log(written(tmp_path, "log.csv", head, [0.001 * T, 0.0 * X + 560.0, U, X, 0.0 * X + 9.0], ","))
+    assert np.allclose(log.command, U, atol=1e-5) and log.units["command"] == "A"
+    assert "current" not in log.extra
+
+
+def test_a_heading_with_fewer_names_than_columns_is_told(tmp_path: Path) -> None:
+    """As R writes a table whose rows have names."""
+    table = read_table(written(tmp_path, "log.csv", "t [s],u [V],x [mm]\n", [T + 1.0, 0.001 * T, U, X], ","))
+    assert list(table.columns) == [f"column {i}" for i in (1, 2, 3, 4)]
+    (told,) = [f.what for f in table.findings if f.kind == "headings"]
+    assert "fewer cells ('t [s],u [V],x [mm]') than the rows, 4" in told
 
 
 def test_a_command_position_beside_the_measured_one_is_the_reference(tmp_path: Path) -> None:
@@ -393,7 +440,11 @@ def test_signals_that_follow_each_other_in_rows_are_told_how_to_turn(tmp_path: P
     path = tmp_path / "log.csv"
     rows = (f"{name},{0.001 * k:.3f},{k}" for k in range(200) for name in ("position", "voltage"))
     path.write_text("name,time [s],value\n" + "\n".join(rows) + "\n")
-    with pytest.raises(InputError, match=r"pivot\(index='time', columns='name', values='value'\)"):
+    with pytest.raises(InputError, match=r"pivot\(index=c\[1\], columns=c\[0\], values=c\[2\]\)"):
+        read_log(path)
+    rows = (f"{name},{0.001 * k:.3f},{k}" for name in ("position", "voltage") for k in range(200))
+    path.write_text("_field,_time [s],_value\n" + "\n".join(rows) + "\n")  # as InfluxDB exports them
+    with pytest.raises(InputError, match=r"pivot\(index=c\[1\], columns=c\[0\], values=c\[2\]\)"):
         read_log(path)
     rows = (f"{name} 2024-05-01 12:00:{0.01 * k:09.6f} {k}" for k in range(200) for name in ("Axis1-PosAct", "Enc"))
     path.write_text("\n".join(rows) + "\n")  # as EPICS's camonitor prints them

@@ -20,11 +20,14 @@ BLANKS = frozenset(
         *("-1.#ind", "1.#qnan", "1.#inf", "-1.#inf", "-nan(ind)", "nan(ind)"),  # of C on Windows
     )
 )
-DATE = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+DATE = re.compile(
+    r"(\d{4}-\d\d-\d\d|\d{4}/\d\d/\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?"
+)
 CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
 # before each line that a terminal shows: `16:20:01.123 -> ` of the Arduino IDE, `[2024-01-01 16:20:01.123] ` of others
 _DAY = r"(?:\d{4}-\d\d-\d\d[ T]|\w{3} \w{3} [ \d]\d )?"
 _STAMP = re.compile(rf"\[?{_DAY}\d\d:\d\d:\d\d(?:[.,]\d+)?(?: \d{{4}})?\]?\s*(?:->|>)?\s+")
+_WITH_UNIT = re.compile(r"(?!0[xX])[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?\s*([^\W\d_]|[°%]){1,4}(/[^\W\d_]{1,3})?")
 _BLOCK = 1 << 22  # bytes
 
 
@@ -66,6 +69,11 @@ def is_number(cell: str, decimal: str) -> bool:
     except ValueError:
         return False
     return cell.lower() not in BLANKS and "_" not in cell and cell.isascii()  # Arrow knows no digits of other scripts
+
+
+def has_unit(cell: str) -> bool:
+    """Whether a cell is a number with its unit behind it: `2.0 V`, `20 %`."""
+    return _WITH_UNIT.fullmatch(cell) is not None
 
 
 def stamped(rows: Sequence[Sequence[str]], decimal: str) -> str:

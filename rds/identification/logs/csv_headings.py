@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from rds.identification.logs.csv_cells import BLANKS, COMMENTS, is_comment, is_number, split
-from rds.identification.logs.units import dimension, plain
+from rds.identification.logs.units import dimension, plain, unit_of_name
 from rds.results.units import split_heading
 
 Split = Callable[[str], list[str]]
@@ -26,6 +26,7 @@ _NO_UNITS = (
     *("setpoint", "set", "demand", "desired", "target", "commanded", "command", "reference", "ref", "soll"),
     *("measured", "actual", "act", "feedback", "ist"),
 )
+_WIDE_BRACKETS = str.maketrans("（）［］｛｝", "()[]{}")  # of Chinese and Japanese keyboards
 _BETWEEN = re.compile(r"\s*[/,]\s*|\s+[iI][nN]\s+")  # a name and its unit
 _SCALES = (("scalefactor", "1"), ("offset", "0"), ("unit scalefactor", "1"), ("unit offset", "0"))
 _LEAST_TIMES = 2  # columns of times, but in an export of TwinCAT's scope
@@ -68,9 +69,14 @@ def alternates(units: Sequence[str | None]) -> bool:
 
 def name_and_unit(cell: str) -> tuple[str, str | None]:
     """Name and unit of a heading; None where it gives none. Without brackets a unit must be one that is known."""
+    cell = cell.translate(_WIDE_BRACKETS)
     name, unit = split_heading(cell)
     if unit is not None and unit.casefold() in _NO_UNITS:
         return cell.strip(), None  # `x (setpoint)`
+    if unit is not None and dimension(unit) is None:
+        own, known = split_heading(name)
+        if known is not None and dimension(known) is not None:
+            return f"{own} ({unit})", known  # `pos [mm] (filtered)`
     if unit is not None or name in _TIMES_ALONE:
         return name, unit or name
     if cell.startswith("in ") and dimension(cell[3:]) == "time":
@@ -209,6 +215,8 @@ def headings_above(lines: Sequence[str], first: int, delimiter: str, decimal: st
         name, unit = (cell, None) if cell in numbered else name_and_unit(cell.strip('"'))
         if units[i] is not None and unit is not None and dimension(unit) is None:
             name, unit = cell.strip('"'), None  # `X(CH1)` above `Volt`
+        if unit is None and units[i] and (own := unit_of_name(name)) and dimension(own) == dimension(units[i] or ""):
+            unit = own  # `time_ms` above `s`
         names.append(f"column {i + 1}" if i in numbers - filled or not name else name)
         if unit and units[i] and dimension(unit) and dimension(units[i] or "") and plain(unit) != plain(units[i] or ""):
             torn.append(f"{name} in {unit}, and {units[i]} below")

@@ -21,6 +21,7 @@ from rds.identification.logs.csv_cells import (
     DATE,
     DELIMITERS,
     are_numbers,
+    has_unit,
     is_comment,
     is_number,
     not_in_utf_8,
@@ -43,6 +44,7 @@ _OTHER_MARK = re.compile(r"\d(;|\t)[+-]?\d")  # between cells that are no cells 
 _TREND = re.compile(r"\d\d:\d\d:\d\d;\d{1,6},")  # a time in a trend of Rockwell's Studio 5000
 _SCOPE_ROWS = ("SymbolComment ", "Data-Type ", "SampleTime[ms] ")  # of TwinCAT's scope, with blanks between the cells
 _FEW_NULLS = 0.2  # share of a text's bytes
+_CONTROLS = re.compile(rb"[\x01-\x06\x0e-\x1a\x1c-\x1f]")  # which no text has
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ class Layout:
     torn: tuple[str, ...] = ()  # of columns for which the heading and the row of units say different units
     beside: int = 0  # columns at the left that hold the recorder's settings beside the samples
     surplus: tuple[str, ...] = ()  # headings below which no cells stand
+    short: str = ""  # a line above the data that has fewer cells than the rows, where no other line names the columns
 
 
 def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
@@ -101,8 +104,13 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
             remedy = "each line as a whole stands in quotation marks; take them off: `tr -d '\"' < FILE > log.csv`"
         elif quoted and decimal is None:
             remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
-        if shown.lstrip().startswith("{"):
-            remedy = "its lines are JSON: in Python `pandas.read_json(FILE, lines=True).to_csv('log.csv', index=False)`"
+        if shown.lstrip().startswith(("{", "[{")):
+            what, how = ("it is", "") if shown.lstrip().startswith("[") else ("its lines are", ", lines=True")
+            remedy = f"{what} JSON: in Python `pandas.read_json(FILE{how}).to_csv('log.csv', index=False)`"
+        if any(all(map(has_unit, cells)) for line in told for cells in [split(line, ",")[1:]] if cells):
+            remedy = (
+                "each cell has its unit in it: export the numbers alone, with the unit in the heading, as in pos [mm]"
+            )
         if any(are_numbers(line.split(":")) for line in lines):
             remedy += "; its cells seem to stand between colons: export it with semicolons between them"
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
@@ -175,7 +183,17 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         scaled,
         torn,
         surplus=surplus,
+        short=_short_heading(lines[:first], mark, point, names),
     )
+
+
+def _short_heading(above: Sequence[str], delimiter: str, decimal: str, names: Sequence[str]) -> str:
+    """The line above the data, where it has words, two or more, but fewer than there are columns without a name."""
+    line = next((line for line in reversed(above) if line.strip()), "")
+    cells = split(line, delimiter)
+    named = any(name != f"column {i + 1}" for i, name in enumerate(names))
+    fits = 1 < len(cells) < len(names) and all(cell and not is_number(cell, decimal) for cell in cells)
+    return line if fits and not named and not is_comment(line) else ""
 
 
 def _broken(lines: Sequence[str]) -> str:
@@ -221,7 +239,7 @@ def _head(path: Path) -> tuple[list[str], str]:
                 f"it is text in {name}; save it as CSV (UTF-8)", str(path)
             )  # read_csv turned it into UTF-8
     if nulls := data.count(b"\0"):
-        if nulls < _FEW_NULLS * len(data) and b"\n" in data:
+        if nulls < _FEW_NULLS * len(data) and b"\n" in data and not _CONTROLS.search(data):
             what = f"it has {nulls} null bytes between its text, as programs in C write the end of each"
             raise InputError(f"{what}; take them off: `tr -d '\\000' < FILE > log.csv`", str(path))
         raise InputError("it is not text (it has null bytes); is its ending right?", str(path))

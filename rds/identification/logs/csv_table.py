@@ -30,12 +30,14 @@ _BLOCK = 1 << 22  # bytes
 _TAIL = 1 << 14  # bytes at the end in which a cut is looked for
 _REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")
 _DOTTED_DATE = re.compile(rb"(?<![\d.])(\d\d)\.(\d\d)\.(\d{4})[T ](?=\d\d:\d\d)")  # the day is first, always
+_SLASHED_DATE = re.compile(rb"(?<![\d/])(\d{4})/(\d\d)/(\d\d)(?=[T ]\d\d:\d\d)")  # of Japanese controls
 _COMMA_TIME = re.compile(rb"(?<!\d)(\d\d:\d\d:\d\d),(\d)")
 _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 _DAY = 86400.0  # s
 _WIDE, _TIMES_WIDER = 100, 10  # columns from which, and rows of which, a table lies on its side
 _FILETIME = 1e16  # in steps of 100 ns since 1601: times in ms are below
 _END = b"EOF"  # the last line of an export of TwinCAT's scope
+_DOS_END = b"\x1a"  # of a text, on DOS and on instruments of that time
 _SPELLED = (str.lower, str.upper, str.capitalize)
 _NULLS = [" ", "NaN", "+Inf", "-Inf", *(spelled(word) for word in BLANKS for spelled in _SPELLED)]
 
@@ -70,7 +72,8 @@ def _of_utf_16(path: Path, delimiter: str | None, decimal: str | None, progress:
         try:
             table = _table(copy, delimiter, decimal, progress)
         except InputError as error:
-            raise InputError(str(error).replace(str(copy), str(path))) from error
+            where = (error.where or str(path)).replace(str(copy), str(path))
+            raise InputError(str(error).removeprefix(f"{error.where}: "), where) from error
     said = Finding("encoding", "it is not UTF-8; it was read as utf-16")
     return replace(table, path=path, findings=(said, *table.findings))
 
@@ -129,6 +132,10 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
         what = f"no cells stand below {', '.join(map(repr, layout.surplus[:8]))} in the heading, which is wider than "
         gravity = Gravity.NOTE if layout.surplus == ("Comment",) else Gravity.WARNING  # LabVIEW's, which is often empty
         findings.append(Finding("headings", what + "the rows; the others were taken from the left", gravity))
+    if layout.short:
+        what = f"the line above the data has fewer cells ({layout.short[:60]!r}) than the rows, {len(names)}: nothing "
+        what += "tells which names go with which columns; write one for each (in R by col.names = NA)"
+        findings.append(Finding("headings", what, Gravity.WARNING))
     columns = {}
     for at, (name, unit) in enumerate(zip(names, layout.units, strict=True)):
         if at < layout.beside:
@@ -296,6 +303,7 @@ class _Rows:
             data, remarks = _REMARK.subn(b"", data)
             self.remarks += remarks
             if self._stamped:  # as Germans and Python's logging write them
+                data = _SLASHED_DATE.sub(rb"\1-\2-\3", data)
                 data = _DOTTED_DATE.sub(rb"\3-\2-\1 ", data)
                 data = data if self._delimiter == b"," else _COMMA_TIME.sub(rb"\1.\2", data)
             if self._spaces:
@@ -405,6 +413,8 @@ def _end(path: Path, layout: Layout) -> tuple[int, Finding | None]:
     *before, last = tail.rstrip(b" \t").split(b"\n")
     if layout.ragged and last.strip() == _END:
         return size, None
+    if before and last.strip() == _DOS_END:
+        return size - len(tail) + tail.rindex(b"\n") + 1, None
     others = [line for line in before[1:] if line.strip()]
     cells = len(split(last.decode(layout.encoding, "replace"), layout.delimiter))
     # rows that end with their channels tell nothing by their length; a \r is no character of a row

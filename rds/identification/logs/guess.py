@@ -48,8 +48,20 @@ _OTHERS = _words(
     "modelled simulated model error err acceleration accel acc difference diff deviation lag temperature temp "
     "fehler abweichung regelabweichung schleppfehler schleppabstand temperatur"
 )
-# voltages that drive nothing
-_SUPPLIES = _words("supply bus battery batt vbus vbat dclink sensor zwischenkreisspannung versorgungsspannung batterie")
+# what drives nothing: supplies, what sensors answer, limits, what acts on the axis from outside
+_SUPPLIES = _words(
+    "supply bus battery batt vbus vbat dclink zwischenkreisspannung versorgungsspannung batterie "
+    "vdc udc zk uzk rail mains netzspannung "
+    "sensor tacho tachometer tachogenerator potentiometer poti encoder resolver lvdt strain loadcell cell ain "
+    "limit limits limitation grenze maximum minimum max min "
+    "friction disturbance external load reaction contact cutting process reibung reibmoment lastmoment stoermoment"
+)
+_SUPPLY_PAIRS = ({"dc", "link"}, {"analog", "input"})
+# lengths and angles that are no position
+_NO_PLACES = _words(
+    "offset compensation correction tolerance thickness diameter backlash electrical commutation phase "
+    "limit limits limitation max min"
+)
 _ACTING = (("voltage",), ("force", "torque"), ("current",))
 _RISING = 0.9  # of the steps of a time go up
 _NO_LOG = "it is no log over time"
@@ -93,7 +105,8 @@ def guess(table: Table) -> Guess:
             spoiled = _spoiled(table, quantity)
             if spoiled and not any(_fitting(columns, quantity) for columns in groups.values()):
                 return Guess(None, spoiled, is_log=False)
-        return Guess(None, "; ".join(doubts) or "no column tells a command and a position by its name and unit")
+        problem = "; ".join(doubts) or "no column tells a command and a position by its name and unit"
+        return Guess(None, problem + _in_turn(table))
     return Guess(LogMap(TimeMap(time, place="the guessed map"), axes, said=tuple(said)), "")
 
 
@@ -111,6 +124,8 @@ def draft(table: Table) -> str:
     named = next((c.name for c in columns if _role(c.name) == "time"), None)
     if named is None and not any(c.unit or _role(c.name) for c in columns):
         named = next((c.name for c in columns if _rises(c.values)), None)
+    elif named is None and len(offered := _perhaps_times(columns)) == 1:
+        named = offered[0]  # as dSPACE's X
     if not table.own_times:
         time = time or named
         if time is not None:
@@ -226,19 +241,36 @@ def _in_turn(table: Table) -> str:
     name = next((c.name for c in table.columns.values() if c.text is not None and c.text[1][:1].isalpha()), None)
     bare = all(re.fullmatch(r"column \d+", called) for called in table.columns)  # no headings: dates are in s
     numbers = [c for c in table.columns.values() if c.text is None]
-    times = [c for c in numbers if (_role(c.name) == "time" and _is_coarse(c)) or (bare and c.unit == "s")]
-    values = [c for c in numbers if c not in times]
+    times = [
+        c
+        for c in numbers
+        if (_role(c.name) == "time" and (_is_coarse(c) or _begins_anew(c))) or (bare and c.unit == "s")
+    ]
+    others = [c for c in numbers if c not in times and dimension(c.unit or "") != "time"]
+    values = [c for c in others if np.isfinite(c.values).any()]
+    values.sort(key=lambda c: "value" not in _tokens(c.name.lower()))
     if name is None or not times or not values:
         return ""
-    pivot = f"`pandas.read_csv(FILE).pivot(index={times[0].name!r}, columns={name!r}, values={values[0].name!r})`"
     said = f"; but where {name!r} says in each row which signal it holds, give each signal a column of its own"
-    return said + ("" if bare else f", in Python by {pivot}")
+    if bare:
+        return said
+    listed = list(table.columns)  # by number, as names are here without their units
+    which = [f"c[{listed.index(each)}]" for each in (times[0].name, name, values[0].name)]
+    turned = "d.pivot(index={}, columns={}, values={})".format(*which)
+    return f"{said}, in Python by `d = pandas.read_csv(FILE, comment='#'); c = d.columns; {turned}.to_csv('log.csv')`"
 
 
 def _is_coarse(column: Column) -> bool:
     """Whether the values go up, and stay the same between."""
     steps = np.diff(column.values[np.isfinite(column.values)])
     return len(steps) > 0 and float(steps.min()) == 0.0 and float(steps.max()) > 0.0
+
+
+def _begins_anew(column: Column) -> bool:
+    """Whether the values go up, and begin with the first one again."""
+    there = column.values[np.isfinite(column.values)]
+    again = np.flatnonzero(np.diff(there) < 0.0) + 1
+    return len(again) > 0 and bool(np.all(there[again] == there[0]))
 
 
 def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
@@ -262,18 +294,21 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     kind = next((report for of, report in kinds.items() if of in units), None)
     if kind is not None and (numbered or in_time):
         sentence += f"; such readings are for `rds report {kind}`"
-    rising = [
-        c.name for c in columns if c.unit is None and _rises(c.values) and (_role(c.name) is None or _is_even(c.values))
-    ]
-    rising = [name for name in rising if name.lower() not in _ORDINALS]
+    rising = _perhaps_times(columns)
     if kind is None and rising:
         named = ", ".join(map(repr, rising[:3])) + (" ..." if len(rising) > 3 else "")
         sentence += f"; where the time is {named}, say so in a map, with its unit: column and unit under [time]"
     return sentence + "; if its rows are equally spaced in time, say so in a map: rate = ... (in Hz) under [time]"
 
 
+def _perhaps_times(columns: Sequence[Column]) -> list[str]:
+    """The columns that nothing calls a time, and that go up as one does."""
+    rising = [c for c in columns if c.unit is None and _rises(c.values) and c.name.lower() not in _ORDINALS]
+    return [c.name for c in rising if _role(c.name) is None or _is_even(c.values)]
+
+
 def _are_alike(a: Column, b: Column) -> bool:
-    return a is b or (a.unit == b.unit and np.array_equal(a.values, b.values, equal_nan=True))
+    return a is b or (a.unit == b.unit and np.allclose(a.values, b.values, rtol=1e-12, atol=1e-9, equal_nan=True))
 
 
 def _rises(values: np.ndarray) -> bool:
@@ -326,7 +361,8 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
         if not fits:
             bare = [c.name for c in measured if c.unit is None]
             doubt = f"no column tells by its unit that it is the {quantity}"
-            strange = [c for c in measured if _is_strange(c) and _role(c.name) in (quantity, None)]
+            roles = (quantity, None, "velocity" if quantity == "position" else None)  # a speed will do
+            strange = [c for c in measured if _is_strange(c) and _role(c.name) in roles]
             doubt += "".join(f"; {c.name!r}: {_unknown(c, quantity)}" for c in strange[:_TOLD])
             if quantity == "command" and (parts := [c for c in measured if dimension(c.unit or "") == "ratio"]):
                 told = " or ".join(f"{c.name} [{c.unit}]" for c in parts[:_TOLD])
@@ -372,8 +408,12 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
     dimensions = DIMENSIONS[quantity]
     fits = [c for c in columns if dimension(c.unit or "") in dimensions]
     if quantity == "command":  # a voltage where there is one, else the torque or force of a drive, else its current
-        fits = [c for c in fits if not _SUPPLIES & {word.lower() for word in _tokens(c.name)}]
+        fits = [c for c in fits if not _drives_nothing(c.name)]
         fits = next((of for d in _ACTING if (of := [c for c in fits if dimension(c.unit or "") in d])), [])
+    if quantity == "current":
+        fits = [c for c in fits if not _drives_nothing(c.name)]
+    if quantity in ("position", "velocity"):
+        fits = [c for c in fits if not _NO_PLACES & {word.lower() for word in _tokens(c.name)}]
     if quantity == "reference":
         return [c for c in fits if _role(c.name) in ("reference", "command")]  # a command position is one
     if quantity != "command":
@@ -388,6 +428,12 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
         acting = [c for c in fits if "voltage" in {word.lower() for word in _tokens(c.name)}]
         fits = acting if len(acting) == 1 else fits
     return fits
+
+
+def _drives_nothing(name: str) -> bool:
+    """Whether a voltage, current or force of this name is none that drives the axis."""
+    words = {word.lower() for word in _tokens(name)}
+    return bool(_SUPPLIES & words) or any(pair <= words for pair in _SUPPLY_PAIRS)
 
 
 def _likely(columns: Sequence[Column], quantity: str) -> Column | None:

@@ -142,16 +142,19 @@ def _read_parquet_here(path: Path) -> Table:
 
 
 def _dates(path: Path) -> dict[str, np.ndarray]:
-    """The columns of dates (s from the first one) and durations (s); pandas keeps a time index so."""
+    """The columns of dates (s from the first one), durations and times of day (s); pandas keeps a time index so."""
     import pyarrow as pa
     from pyarrow import parquet
 
     found = {}
     try:
         for field in parquet.read_schema(path):
-            if pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type):
+            of_day = pa.types.is_time(field.type)
+            if pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type) or of_day:
                 is_date = pa.types.is_timestamp(field.type)
                 column = parquet.read_table(path, columns=[field.name], page_checksum_verification=True).column(0)
+                if of_day:  # since midnight
+                    column = column.cast(pa.time64("ns")).cast(pa.int64()).cast(pa.duration("ns"))
                 exact = column.cast(pa.timestamp("ns") if is_date else pa.duration("ns")).to_numpy()
                 if is_date:
                     found[field.name] = since_first(exact.astype("datetime64[ns]"))

@@ -11,6 +11,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.options import check_known
+from rds.identification.logs.csv_cells import has_unit
 from rds.identification.logs.csv_headings import name_and_unit
 from rds.identification.logs.log import Finding
 
@@ -103,6 +104,13 @@ def remedy(cell: str) -> str:
         )
     if _DECIMAL_COMMA.fullmatch(cell):
         return 'every cell must be a number: if this is a decimal comma, say decimal = "comma" under [table] in a map'
+    if has_unit(cell):
+        return (
+            "every cell must be a number: export the file without a unit in each cell, and put it into the heading, as "
+            "in pos [mm]"
+        )
+    if cell.startswith("\u2212"):
+        return "every cell must be a number: its minus sign is that of a word processor (U+2212); write - in its place"
     return (
         "every cell must be a number: repair it or choose another column; where such cells are emptied, "
         'blanks = "drop" in a map leaves their rows out'

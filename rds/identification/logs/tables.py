@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rds.bus.tools.log_formats import ENDINGS as BUS_ENDINGS
-from rds.bus.tools.log_formats import READ_ONLY
+from rds.bus.tools.log_formats import PACKED, READ_ONLY
 from rds.core.errors import InputError
 from rds.core.progress import Progress
+from rds.identification.logs.signatures import unpacked_start, what_it_is
 from rds.identification.logs.table import Table
 
 TEXTS = (".csv", ".txt", ".dat", ".tsv", ".prn", ".lvm")
@@ -107,6 +108,17 @@ def _is_of_bus(path: Path, asked: ReadOptions) -> bool:
         return _OF_BUS.match(stream.read(60).removeprefix(codecs.BOM_UTF8)) is not None
 
 
+def _packed_table(path: Path) -> str:
+    """What to do with a gzip file that holds no bus log; "" for another file."""
+    name = path.name.lower()
+    if not name.endswith(".gz") or (name.endswith(PACKED) and not name.endswith(".csv.gz")):
+        return ""
+    start = unpacked_start(path)
+    if name.endswith(".csv.gz") and (not start or _OF_BUS.match(start.removeprefix(codecs.BOM_UTF8))):
+        return ""
+    return "only bus logs are read as they are packed; unpack it, as by `gunzip -k FILE`"
+
+
 _read_csv = _late("csv_table", "read_csv", "delimiter", "decimal", "progress")
 _read_can = _late("can_table", "read_can", "dbc", "progress")
 
@@ -187,6 +199,8 @@ def read_table(
         raise InputError("there is no such file; check the name and the folder", str(path))
     ending, asked = path.suffix.lower(), ReadOptions(delimiter, decimal, dbc, progress)
     try:
+        if told := what_it_is(path, ending, (*TEXTS, ".log")) or _packed_table(path):
+            raise InputError(told)
         fitting = (each for each in FORMATS if ending in each.endings and (not each.is_one or each.is_one(path, asked)))
         found = next(fitting, None)
         if found is None:

@@ -52,10 +52,11 @@ _SPELLINGS: Mapping[str, str] = MappingProxyType(
         **dict.fromkeys(("°/s", "deg/sec", "dps"), "deg/s"),
         **{f"{length}/sec": f"{length}/s" for length in ("m", "mm", "um", "in", "rad")},
         **dict.fromkeys(("rpm", "RPM", "r/min", "U/min", "1/min", "min-1"), "rev/min"),
+        **dict.fromkeys(("krpm", "kRPM"), "krev/min"),
         **dict.fromkeys(("turn", "turns"), "rev"),
         **dict.fromkeys(("U/s", "r/s", "rps", "turn/s", "turns/s"), "rev/s"),
         **dict.fromkeys(("count", "cts", "cnt", "inc", "increments", "ticks", "pulse", "pulses", "steps"), "counts"),
-        "incs": "counts",
+        **dict.fromkeys(("incs", "qc", "quadcounts"), "counts"),  # EPOS counts quarters of a line
         **dict.fromkeys(("cts/s", "inc/s", "ticks/s", "pulses/s", "steps/s", "count/s", "counts/sec"), "counts/s"),
         **dict.fromkeys(("volt", "volts", "Volt", "Volts"), "V"),
         **dict.fromkeys(("ampere", "amperes", "amp", "amps", "Ampere", "Amp", "Amps"), "A"),

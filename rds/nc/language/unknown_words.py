@@ -91,10 +91,14 @@ _LANGUAGES = tuple(
             r"[0-9]*(?:(?:begin|end)pgm|tool(?:call|def)|cycl(?:call|def)|call(?:lbl|pgm)|blkform|[lc]{1,2}[xyz][-+])",
             _HEIDENHAIN,
         ),
-        (r"(?:exclude_object|set_[a-z_]+|bed_mesh|print_start|start_print|timelapse)", _KLIPPER),
+        (
+            r"(?:exclude_object|set_[a-z_]+|bed_mesh|timelapse|[a-z]+_(?:print|start|end)\b|print_(?:start|end)"
+            r"|[a-z]+_[a-z_]+[a-z](?:[a-z_]+=|$))",
+            _KLIPPER,
+        ),
         (
             r"(?:n[0-9]+)?(?:a?(?:trans|rot|scale|mirror)(?:$|[;xyzr])|cycle[0-9]+\(|mcall|msg\(|r[0-9]+="
-            r"|def(?:real|int|bool|string)|goto[bfc]|(?:pocket|slot|holes)[0-9]\(|if[r$])|[^(;<#$]*[a-z]{2}=",
+            r"|def(?:real|int|bool|string)|goto[bfc]|(?:pocket|slot|holes)[0-9]\(|if[r$])|[^(;<#$]*(?:[a-z]{2}=|[a-z][0-9]*=(?:[a-z]|\"))",
             _SIEMENS,
         ),
         (r"(?:n[0-9]+)?(?:[bd]prnt\[|popen$|pclos$)", _PRINTED),
