@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.options import known_keywords
 from rds.core.progress import Progress
 from rds.core.quantities import Flag, Quantity, checked
 from rds.core.shared_quantities import FREE_FEED, LOCKED_FEED, TIED_FEED
@@ -199,6 +200,7 @@ class PartProgram(Experiment):
     Raises InputError, with all faults by line, for a program that the machine cannot run.
     """
 
+    @known_keywords
     def __init__(
         self,
         file: str | Path,

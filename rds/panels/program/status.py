@@ -50,7 +50,8 @@ def _head(status: Status | None, override: float, modes: Modes | None) -> str:
     return (
         f'<p class="rds-state" role="status"><b>Line {status.line}</b> {STATES[status.state]} · '
         f"{status.time:.1f} s · {status.share:.0%} of the program</p>"
-        f'<p class="rds-state">Feed <b>{status.feed:.0f}</b> mm/min{_wanted(modes)}, override {override:.0f} %{locked}</p>'
+        f'<p class="rds-state">Feed <b>{status.feed:.0f}</b> mm/min{_wanted(modes)}, override {override:.0f} %'
+        f"{locked}</p>"
     )
 
 
