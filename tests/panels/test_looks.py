@@ -76,4 +76,4 @@ def test_what_is_said_of_a_button_is_in_sight_beside_it_as_the_stop_is_and_each_
     page.click('.rds-nav button:text-is("Equipment control")')
     page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
     run = page.locator("button.rds-run:visible").bounding_box()
-    assert 0 <= run["y"] and run["y"] + run["height"] <= 400  # below the settings it was not reached without scrolling
+    assert run["y"] >= 0 and run["y"] + run["height"] <= 400  # below the settings it was not reached without scrolling
