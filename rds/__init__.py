@@ -88,7 +88,15 @@ def __getattr__(name: str) -> _Any:
         meant = f"did you mean rds.{near[0]}? " if near else ""
         raise AttributeError(f"module 'rds' has no attribute {name!r}; {meant}dir(rds) lists what there is")
     module, _, called = _NAMES[name].partition(":")
-    return getattr(_import(module), called or name)
+    found = getattr(_import(module), called or name)
+    if isinstance(found, type(_import)):  # a function
+        from rds.core.options import known_keywords
+
+        theirs, found = found, known_keywords(found)
+        if found is not theirs:
+            found.__module__, found.__qualname__ = __name__, name  # as it is looked for in another process
+        globals()[name] = found
+    return found
 
 
 def __dir__() -> list[str]:

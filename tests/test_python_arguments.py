@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import pickle
 import shutil
 import sys
 from collections.abc import Callable
@@ -128,6 +129,26 @@ def test_a_number_is_no_file_and_closes_none(read: Any) -> None:
     finally:
         os.close(ours)
         os.close(theirs)
+
+
+@pytest.mark.parametrize(
+    ("do", "said"),
+    [
+        (lambda: rds.Experiment(durration=1.0), r"Experiment\(\) has no argument 'durration'.*mean 'duration'\?"),
+        (lambda: short().run(mod="emulation"), r"Experiment.run\(\) has no argument 'mod'.*mean 'mode'\?"),
+        (lambda: rds.PartProgram("a.ngc", machin="arm"), r"PartProgram\(\) has no argument .*mean 'machine'\?"),
+        (lambda: rds.load_machine(nme="arm"), r"load_machine\(\) has no argument 'nme'; it has name.*mean 'name'\?"),
+        (lambda: rds.sinusoid(5.0, freqency=0.2), r"sinusoid\(\) has no argument .*mean 'frequency'\?"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_an_unknown_argument_is_answered_with_the_near_one(do: Callable[[], Any], said: str) -> None:
+    with pytest.raises(rds.InputError, match=said):
+        do()
+
+
+def test_a_function_of_the_face_goes_to_another_process() -> None:
+    assert pickle.loads(pickle.dumps(rds.fit)) is rds.fit
 
 
 @pytest.mark.parametrize("given", [(5.0, 0.2), np.ones(1000), "rows.csv", 5.0])

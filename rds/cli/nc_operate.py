@@ -68,7 +68,7 @@ def _operate(running: ProgramRun, keys: Keys) -> None:
             while not running.done:
                 status = running.status()
                 if status is not None:
-                    line.update(_line(status, running), refresh=True)
+                    line.update(live_line(status, running), refresh=True)
                 for key in keys.pressed(_LOOK):
                     press(key, running)
         except KeyboardInterrupt:
@@ -98,8 +98,10 @@ def press(key: str, running: ProgramRun) -> None:
         return
 
 
-def _line(status: Status, running: ProgramRun) -> str:
+def live_line(status: Status, running: ProgramRun) -> str:
     """The live line: where, what, how fast, how far."""
+    from rds.nc.run.run import LOCKS
+
     axes = "  ".join(
         f"{name} {value:.0f} rev/min" if running.units.get(f"{name}_measured") == "rev/min" else f"{name} {value:.3f}"
         for name, value in status.measured.items()
@@ -111,6 +113,8 @@ def _line(status: Status, running: ProgramRun) -> str:
         override = f"{running.live_values['override']:.0%}"
     except Exception:  # it has just ended
         override = "–"
+    if lock := LOCKS.get(status.whose_feed):
+        override += f" ({lock})"
     return (
         f"line {status.line} {_STATES[status.state]}  {axes}  feed {status.feed:.0f} mm/min, override {override}  "
         f"{status.share:.0%} of {predicted:.1f} s\n{_HELP}"

@@ -2,20 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from inspect import Parameter, signature
+from typing import Any, ParamSpec, TypeVar
 
 from rds.core.errors import InputError
 from rds.core.quantities import Quantity, near
 
+P = ParamSpec("P")
+T = TypeVar("T")
 
-def check_known(given: Iterable[str], known: Iterable[str], owner: str) -> None:
+
+def known_keywords(function: Callable[P, T]) -> Callable[P, T]:
+    """The function, which answers an unknown keyword argument as unknown words of a TOML file are answered."""
+    parameters = signature(function).parameters.values()
+    if any(each.kind is Parameter.VAR_KEYWORD for each in parameters):
+        return function
+    known = [each.name for each in parameters if each.kind is not Parameter.POSITIONAL_ONLY and each.name != "self"]
+    owner = function.__qualname__.removesuffix(".__init__")
+
+    @wraps(function)
+    def call(*given: P.args, **named: P.kwargs) -> T:
+        if not named.keys() <= {*known}:
+            check_known(named, known, f"{owner}()", "argument")
+        return function(*given, **named)
+
+    return call
+
+
+def check_known(given: Iterable[str], known: Iterable[str], owner: str, kind: str = "option") -> None:
     """InputError naming the first option that `owner` does not have, and listing those that it has."""
     table = list(known)
     for name in given:
         if name not in table:
             has = f"it has {', '.join(table)}" if table else "it has none"
-            raise InputError(f"{owner} has no option {name!r}; {has}{near(name, table)}")
+            raise InputError(f"{owner} has no {kind} {name!r}; {has}{near(name, table)}")
 
 
 def read_options(given: Mapping[str, Any], options: Mapping[str, Quantity], owner: str) -> dict[str, float]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import hmac
 import json
+import os
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -208,7 +209,29 @@ def serve(jobs: Jobs, address: Address, with_secret: bool, ready: Callable[[], N
     listener = address.listen()
     try:
         secret = address.new_secret() if with_secret else None
+        _keep_this_process()
         asyncio.run(Server(jobs, address, secret).serve(listener, ready))
     finally:
         listener.close()
         address.leave()
+
+
+def _keep_this_process() -> None:
+    """Let code of a job that would end this process end its job only; a job is loaded and simulated in a thread here.
+
+    A crash of compiled code still ends the server, but no run against the clock, which has processes of its own.
+    """
+    server = os.getpid()
+
+    def instead_of(name: str) -> Callable[..., Any]:
+        ours = getattr(os, name)
+
+        def call(*given: Any) -> Any:
+            if os.getpid() != server or (name == "kill" and (given[:1] != (server,) or given[1:] == (0,))):
+                return ours(*given)
+            raise SystemExit(f"os.{name}() would have ended the server of jobs; remove it")
+
+        return call
+
+    for name in ("_exit", "abort", "kill"):
+        setattr(os, name, instead_of(name))

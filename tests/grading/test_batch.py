@@ -90,6 +90,12 @@ def test_a_row_for_each_whatever_happened(outcome: BatchOutcome) -> None:
         assert (grade.score > 0.0) == (grade.student in ("ada", "ben", "hal", "ivy", "gus"))
 
 
+def test_messages_call_a_file_by_the_name_that_was_handed_in(outcome: BatchOutcome, place: Path) -> None:
+    """It was submission.py for everybody."""
+    page = (place / "out/students/eve/feedback.html").read_text()
+    assert "eve.py:1" in outcome.grades["eve"].reason and "eve.py:1" in page and "submission.py" not in page
+
+
 def test_who_is_late_loses_and_whose_notebook_was_cut_is_told(outcome: BatchOutcome) -> None:
     ivy, gus = outcome.grades["ivy"], outcome.grades["gus"]
     assert ivy.late_days == pytest.approx(2.0 - 1.0 / 24.0)

@@ -239,6 +239,24 @@ def test_a_file_that_raises_keyboard_interrupt_does_not_end_the_server(serve: Se
     assert server.process.stderr.read() == ""  # of clients that were connected there was a traceback
 
 
+def test_code_that_ends_its_process_ends_its_job_only(serve: Serve) -> None:
+    server = serve()
+    client, folder = server.client(), server.folder
+    law = "import os\ndef control(t, r, y, state, params):\n    if t > 0.1: {}\n    return 0.0, state\n"
+    for name in ("first", "law"):
+        (folder / f"{name}.toml").write_text(EXPERIMENT.format(controller=f'file = "{name}.py"'))
+    for ending in ("os._exit(3)", "os.abort()", "os.kill(os.getpid(), 9)"):
+        said = f"{ending.partition('(')[0]}() would have ended the server of jobs; remove it"
+        (folder / "first.py").write_text(f"import os\n{ending}\n")
+        told = client.ask(do="load", file="first.toml")["error"]
+        assert "first.py, line 2" in told and said in told
+        (folder / "law.py").write_text(law.format(ending))
+        job = client.ask(do="load", file="law.toml")["job"]
+        client.ask(do="run", job=job)
+        told = client.until_over(job)["error"]
+        assert "law.py, line 3" in told and said in told
+
+
 def test_texts_in_an_experiment_may_be_longer_than_names_of_files(tmp_path: Path) -> None:
     law = "params = {'note': ''}\ndef control(t, r, y, state, params):\n    return 0.0, state\n"
     (tmp_path / "law.py").write_text(law)

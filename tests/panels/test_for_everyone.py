@@ -45,6 +45,13 @@ def test_axe_finds_nothing_serious_on_any_panel_in_light_and_dark(
     assert not found, "\n".join(f"{where}: {each}" for where, said in found.items() for each in said)
 
 
+def test_no_panel_leaves_out_a_level_of_headings() -> None:
+    """Below the panel's title, h1, all of them were h3, with no h2 above."""
+    panels = ROOT / "rds" / "panels"
+    sources = [path.read_text() for path in panels.rglob("*.py")]
+    assert not any("<h3" in text for text in sources) and sum("<h2" in text for text in sources) >= 8
+
+
 def test_the_keyboard_runs_and_stops_and_what_comes_of_it_is_read_out(
     second_app: App, open_page: Callable[..., Any]
 ) -> None:
@@ -83,3 +90,13 @@ def test_the_keyboard_runs_and_stops_and_what_comes_of_it_is_read_out(
     page.keyboard.press("Escape")
     page.wait_for_selector('[aria-live=polite] :text("ended early: stopped"):visible')
     assert not page.locator('.rds-notice:has-text("emergency stop")').count()  # the run, and nothing more
+    for begun in (True, False):  # from another panel, also where there is no Stop yet
+        page.click("button.rds-run:visible")
+        if begun:
+            page.wait_for_selector('.rds-work:has-text("running"):visible')
+        page.click('.rds-nav button:text-is("Jog")')
+        page.wait_for_selector('.rds-title h1:text-is("Jog")')
+        page.keyboard.press("Escape")
+        page.click('.rds-nav button:text-is("Equipment control")')
+        page.wait_for_selector('[aria-live=polite] :text("ended early: stopped"):visible')
+        page.wait_for_selector(".rds-work:visible", state="hidden")

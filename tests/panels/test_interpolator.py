@@ -79,7 +79,7 @@ def test_a_table_of_segments_and_what_it_refuses(same_page: Callable[[str], Any]
     page.click('button:text-is("Add an arc")')
     page.wait_for_selector('.rds-group button[title="Remove this segment"] >> nth=2')
     _go(page)
-    page.wait_for_selector('h3:has-text("3 segments")')
+    page.wait_for_selector('h2:has-text("3 segments")')
     first = page.locator('input[placeholder="feed"]').first
     first.fill("fast")
     first.press("Enter")

@@ -72,3 +72,8 @@ def test_what_is_said_of_a_button_is_in_sight_beside_it_as_the_stop_is_and_each_
         return place.firstChild.getBoundingClientRect().right;
     }""")
     assert right <= 1024  # long lines of a command scroll within the panel
+    page.set_viewport_size({"width": 640, "height": 400})  # as at a zoom of 200 %
+    page.click('.rds-nav button:text-is("Equipment control")')
+    page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
+    run = page.locator("button.rds-run:visible").bounding_box()
+    assert run["y"] >= 0 and run["y"] + run["height"] <= 400  # below the settings it was not reached without scrolling

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from math import cos, radians, sin
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rds.cli.nc_operate import live_line
 from rds.cli.nc_options import ProgramOptions
 from rds.core.errors import InputError
 from rds.interpolators.motion.segments import AXES, JOINTS
@@ -298,6 +300,28 @@ class Told(ProgramRun):
 
     def read(self, first: int = 0) -> tuple[int, np.ndarray]:
         return 0, self.row[None]
+
+
+@pytest.mark.parametrize("words", [{}, {"interpolator": "linear"}])
+def test_an_operator_sees_that_the_program_has_locked_the_override(tmp_path: Path, words: dict[str, Any]) -> None:
+    """His override was shown as if it acted."""
+    text = "G21 G90 G94 G61\nF600\nG1 X2\nM49\nG1 X4\nM48\nG1 X6\nM2\n"
+    (tmp_path / "part.ngc").write_text(text)
+    part = PartProgram(tmp_path / "part.ngc", "mini-cnc", **words)
+    result = part.run()
+    run = Told(part.plan(), None, lambda live, progress: result)
+    said = {}
+    for line in (3, 5, 7):
+        at = np.flatnonzero(result["program_line"] == line)
+        sample = at[len(at) // 2]
+        run.columns = ["sample", *result.columns]
+        run.row = np.array([sample, *(column[sample] for column in result.columns.values())])
+        status = run.status()
+        assert status is not None
+        page, terminal = status_html(status, {}, part.plan().machine, 150.0), live_line(status, run)
+        said[line] = "locked at 100 % by the program's M49" in page
+        assert said[line] == ("locked at 100 % by the program's M49" in terminal)
+    assert said == {3: False, 5: True, 7: False}
 
 
 def test_an_operator_sees_the_tip_and_its_feed(tmp_path: Path) -> None:

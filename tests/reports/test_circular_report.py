@@ -225,6 +225,19 @@ def test_a_form_that_is_another_has_no_confident_cause(tmp_path: Path) -> None:
     assert "it is noise, or has another cause" in report.findings[-1]
 
 
+@pytest.mark.parametrize("change", [-10.0, 50.0])
+def test_a_spiral_is_said_and_is_no_ellipse(tmp_path: Path, change: float) -> None:
+    """A tenth of what its radius changes by was a scale mismatch."""
+    table = both_ways()
+    rate = FEED / RADIUS / (2 * pi)  # turns per second
+    table[:, 1:] *= 1 + 1e-3 * change / RADIUS * rate * table[:, :1]
+    report = report_of(tmp_path, table)
+    assert not causes(report)
+    spirals = [text for text in report.findings if "spiral" in text]
+    said = [float(text.split("changes by ")[1].split(" µm in a turn")[0]) for text in spirals]
+    assert said == pytest.approx([change, change], rel=0.01)
+
+
 def test_a_reading_that_is_off_and_a_drift_are_no_friction(tmp_path: Path) -> None:
     """A spike stands at most reversals of its axis; these once were spikes of 250 and 3 µm."""
     glitch, drift = both_ways(), both_ways()

@@ -20,7 +20,13 @@ from rds.grading.review.class_grades import everyone
 from rds.grading.review.entries import Review, read_review
 
 STUDENTS, GRADE, FEEDBACK = "students", "grade.json", "feedback.html"
-CODE, COLUMNS = "submission.py", "columns.parquet"  # what a submission is called in messages to its author, too
+CODE, COLUMNS = "submission.py", "columns.parquet"
+
+
+def python_name(details: Mapping[str, Any]) -> str:
+    """What a submission is called in messages to its author: the name handed in; of a notebook, with .py for .ipynb."""
+    name = str(details.get("file") or CODE)
+    return name if name.endswith(".py") else f"{name.rpartition('.')[0] or name}.py"
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,14 @@ from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.core.private_files import make_folder, write_private
 from rds.grading.assignment.assignment import FILE, Assignment, read_assignment
-from rds.grading.batch.finished import CODE, COLUMNS, FEEDBACK
+from rds.grading.batch.finished import CODE, COLUMNS, FEEDBACK, python_name
 from rds.grading.batch.grade_one import grade_with_runs
 from rds.grading.batch.scratch import scratch
 from rds.grading.batch.spool import Spooled
 from rds.grading.batch.warm_worker import own_fault, shared_pool
 from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import AS_SOLUTION, BEHAVIOUR
+from rds.grading.sandbox.submission import safe_name
 from rds.results.arrow import repeated, to_arrow
 
 if TYPE_CHECKING:
@@ -82,14 +83,12 @@ def graded(setup: Setup, task: Task) -> Answer:
     pool = shared_pool(setup.jobs)  # it starts while the assignment is read
     assignment, solution = _assignment(setup)
     began = time.monotonic()
-    if task.path:
-        found = grade_with_runs(assignment, task.path, task.student, pool, submitted=task.time)
-    else:
-        assert task.code is not None  # where no folder is shared
-        with scratch("submission") as folder:
-            path = folder / CODE
-            write_private(path, task.code.read(), is_own=True)
-            found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
+    with scratch("submission") as folder:
+        path = folder / safe_name(python_name(task.about))
+        assert task.path or task.code is not None  # where no folder is shared
+        code = Path(task.path).read_bytes() if task.code is None else task.code.read()
+        write_private(path, code, is_own=True)
+        found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
     grade, seconds = found.grade, time.monotonic() - began
     expected = _expected(setup) if solution else ()
     own = behaviour(assignment, found.runs)

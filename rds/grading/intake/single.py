@@ -28,7 +28,7 @@ def as_python(assignment: Assignment, file: Path) -> Iterator[Path]:
         yield file
         return
     with tempfile.TemporaryDirectory(prefix="rds-notebook-") as folder:
-        path = Path(folder) / "submission.py"
+        path = Path(folder) / f"{file.stem}.py"
         try:
             write_private(path, converted(read_regular(file, LARGEST), wanted(assignment)).code, is_own=True)
         except Refusal as error:

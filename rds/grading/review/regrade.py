@@ -12,7 +12,7 @@ from typing import Any
 from rds.core.atomic import write_files, write_whole
 from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
-from rds.grading.batch.finished import CODE, Finished, read_finished
+from rds.grading.batch.finished import CODE, Finished, python_name, read_finished
 from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.run import BatchOptions, grade_all
 from rds.grading.course.class_list import FILE as CLASS
@@ -140,9 +140,7 @@ def _kept(before: Finished) -> Intake:
         row = HandedIn(student, time=before.time(student), source=dict(source) if isinstance(source, dict) else {})
         path = before.kept[student] / CODE
         if path.is_file():
-            name = str(details.get("file") or CODE)
-            # what was a notebook is Python by now
-            name = name if name.endswith(".py") else CODE
+            name = python_name(details)  # what was a notebook is Python by now
             rows.append(replace(row, name=name, read=partial(read_regular, path, LARGEST)))
         else:
             is_lost = grade.status not in _WITHOUT_FILE

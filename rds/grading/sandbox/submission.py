@@ -58,4 +58,9 @@ def read_submission(path: Path) -> Submission:
         data = file.read(LARGEST + 1)
     if len(data) > LARGEST:
         raise SubmissionError(Status.REFUSED, f"it has more than {LARGEST} bytes; keep data out of it")
-    return Submission(path.name if _SAFE_NAME.fullmatch(path.name) else "submission.py", data)
+    return Submission(safe_name(path.name), data)
+
+
+def safe_name(name: str) -> str:
+    """The name, where it is a plain one of a Python file."""
+    return name if _SAFE_NAME.fullmatch(name) else "submission.py"

@@ -12,6 +12,7 @@ from typing import Any
 from rds.core.errors import ContractError, InputError, MachineError, RdsError
 from rds.core.folder_kept import folder_kept
 from rds.core.last_made import LastMade
+from rds.core.options import known_keywords
 from rds.core.progress import Progress
 from rds.core.toml_table import TomlTable
 from rds.core.types import Ending
@@ -64,6 +65,7 @@ class Experiment:
         emulated = experiment.run("emulation")
     """
 
+    @known_keywords
     def __init__(
         self,
         machine: str | Path = "mini-cnc",
@@ -194,6 +196,7 @@ class Experiment:
         """What would run: every part made and checked. Raises InputError for what will not do."""
         return self._resolve(mode)[0]
 
+    @known_keywords
     def run(
         self,
         mode: str | None = None,
@@ -216,6 +219,7 @@ class Experiment:
         run = self._prepared(mode, out, changes)
         return run.start().wait(progress) if load_mode(run.plan.mode).real_time else run.here(progress)
 
+    @known_keywords
     def start(self, mode: str | None = None, *, out: str | Path | None = None, changes: Iterable[Any] = ()) -> Run:
         """Begin to run in `mode`, and return at once: a handle on the run, which can be watched, changed and stopped.
 

@@ -118,6 +118,7 @@ class InterpolatedProgram:
     notes: tuple[str, ...] = ()
     name: str = ""
     blu: float = 0.0
+    overrides: tuple[tuple[int, float], ...] = ()  # whose the feed is after a segment: its index, FREE_FEED and so on
 
 
 def dwell_samples(seconds: float, T: float) -> int:

@@ -232,7 +232,8 @@ def of_part_program(
         due[after] = (*due.get(after, ()), ProgramEvent(0, event.kind, float(event.value), event.line))
     first = due.pop(-1, ())
     made = program_of(file.name, segments, programmed.lines, due, first, method, machine, axes, T, spindle=True)
-    return replace(made, notes=(*notes, *made.notes))
+    overrides = tuple((after, float(event.value)) for after, event in programmed.events if event.kind == "override")
+    return replace(made, notes=(*notes, *made.notes), overrides=overrides)
 
 
 def method_of(words: TomlTable, folder: Path) -> Method:

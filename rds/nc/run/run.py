@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import ceil, hypot, inf
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.options import known_keywords
 from rds.core.progress import Progress
 from rds.core.quantities import Flag, Quantity, checked
+from rds.core.shared_quantities import FREE_FEED, LOCKED_FEED, TIED_FEED
 from rds.core.toml_table import TomlTable
 from rds.core.types import SPINDLE_UNIT
 from rds.interpolators.motion.segments import AXES, JOINTS
@@ -36,6 +39,10 @@ from rds.results import Result
 
 SPINDLE_CONTROLLER = {"name": "pid"}
 _BEGIN = Quantity("line of the program to begin at; 0: at its head", low=0, whole=True)
+LOCKS = {  # what is said of an override that does not act
+    LOCKED_FEED: "locked at 100 % by the program's M49",
+    TIED_FEED: "locked at 100 % while the feed follows the spindle",
+}
 _AHEAD = 1e-3  # s, over which the rate of the tip is taken
 
 
@@ -63,6 +70,7 @@ class Status:
     reference: dict[str, float]
     tip: dict[str, float] = field(default_factory=dict)  # X, Y, Z of the tool's tip on the work, while G43.4 is on
     to_go: dict[str, float] = field(default_factory=dict)  # to the end of the move, by axis; of moves of the joints
+    whose_feed: float = FREE_FEED  # FREE_FEED, LOCKED_FEED or TIED_FEED
 
 
 class ProgramRun(Run):
@@ -111,7 +119,23 @@ class ProgramRun(Run):
             reference={name: of[f"{name}_reference"] for name in self.plan.names},
             tip=tip,
             to_go=self._to_go(of),
+            whose_feed=self._whose_feed(of),
         )
+
+    @cached_property
+    def _changes_of_feed(self) -> list[tuple[int, float]]:
+        """Where the feed becomes the operator's, the program's or the spindle's: behind a sample, or a segment."""
+        program = self.plan.program
+        if isinstance(program, Program):
+            return [(each.sample, each.value) for each in program.happenings if each.kind == "override"]
+        return [] if program is None else [(after + 2, whose) for after, whose in program.overrides]
+
+    def _whose_feed(self, of: dict[str, float]) -> float:
+        """FREE_FEED, LOCKED_FEED or TIED_FEED; the way home is free."""
+        if int(of["program_state"]) == State.HOME:
+            return FREE_FEED
+        at = of["program_sample" if isinstance(self.plan.program, Program) else "program_segment"]
+        return next((whose for due, whose in reversed(self._changes_of_feed) if due <= at), FREE_FEED)
 
     def _to_go(self, of: dict[str, float]) -> dict[str, float]:
         """How far each axis is from the end of the move that goes on; nothing on the way home, or if unknown."""
@@ -176,6 +200,7 @@ class PartProgram(Experiment):
     Raises InputError, with all faults by line, for a program that the machine cannot run.
     """
 
+    @known_keywords
     def __init__(
         self,
         file: str | Path,

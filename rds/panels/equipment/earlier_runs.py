@@ -147,5 +147,5 @@ def difference_html(a: RunRow, b: RunRow, names: Sequence[str]) -> str:
     before, after = code_of(a), code_of(b)
     for key in before.keys() & after.keys():
         if before[key] != after[key]:
-            shown += f"<h3>{key.capitalize()}</h3>{changes_html(changes(before[key], after[key]))}"
+            shown += f"<h2 class=rds-part>{key.capitalize()}</h2>{changes_html(changes(before[key], after[key]))}"
     return shown

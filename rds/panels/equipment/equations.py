@@ -25,7 +25,7 @@ def equations(plan: Plan) -> list[tuple[str, list[str]]]:
 def equations_html(parts: list[tuple[str, list[str]]]) -> str:
     """The same for a page."""
     return "".join(
-        f'<h3>{escape(title)}</h3><p class="rds-equation">{"<br>".join(map(escape, lines))}</p>'
+        f'<h2 class=rds-part>{escape(title)}</h2><p class="rds-equation">{"<br>".join(map(escape, lines))}</p>'
         for title, lines in parts
     )
 

@@ -120,7 +120,7 @@ class ResultView:
             from rds.identification.validate.report import fragment
 
             parts = [fragment(found, pictures=False) for found in result.validation.values()]
-            self.validation.value = f"<h3>Does the model hold?</h3>{''.join(parts)}"
+            self.validation.value = f"<h2 class=rds-part>Does the model hold?</h2>{''.join(parts)}"
 
 
 _STAGE_NAMES = {

@@ -119,7 +119,7 @@ def source_html(checked: Checked) -> str:
             at.setdefault(mark.line, []).append(mark)
     notes = "".join(f"<p>{escape(note)}</p>" for note in checked.notes)
     return (
-        f"<h3>{escape(checked.role.capitalize())}: {escape(checked.path.name)}, {state}</h3>{general}"
+        f"<h2 class=rds-part>{escape(checked.role.capitalize())}: {escape(checked.path.name)}, {state}</h2>{general}"
         f'<pre class="rds-source">{_lines(checked.text, at)}</pre>{notes}'
     )
 

@@ -104,7 +104,7 @@ class GradingView:
         finished = self.state.finished()
         left = len(finished.not_graded)
         page = finished.folder / "index.html"
-        about = f"<h3>{escape(finished.title)}: {len(finished.grades)} graded, {left} left</h3>"
+        about = f"<h2 class=rds-part>{escape(finished.title)}: {len(finished.grades)} graded, {left} left</h2>"
         links = f"<p>feedback pages: {escape(str(finished.folder / 'students'))}; the class: {escape(str(page))}</p>"
         grades = html.table(["student", "status", "score", "why"], rows(finished.grades))
         self.table.value = about + grades + links + _said_of(finished)

@@ -241,7 +241,8 @@ class InterpolatorView:
         half = -(-len(rows) // 2)
         both = "".join(table(["quantity", "", "unit"], part) for part in (rows[:half], rows[half:]))
         self.numbers.value = (
-            f'<h3>{title}</h3><div class="rds-side-by-side rds-compact">{both}</div>{notes_list(self.work.notes)}'
+            f'<h2 class=rds-part>{title}</h2><div class="rds-side-by-side rds-compact">{both}</div>'
+            f"{notes_list(self.work.notes)}"
         )
         if done.within:
             self.notice.say(f"done: {done.samples} samples, {done.duration:.4g} s", "good")

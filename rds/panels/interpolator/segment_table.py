@@ -79,7 +79,8 @@ class SegmentTable(widgets.VBox):
             row.label.value = f"{number}"
         buttons = widgets.HBox([self._add, self._add_arc])
         buttons.add_class("rds-row")
-        head = Html("<h3>Segments: each begins where the one before ends (positions in mm: X, Y or X, Y, Z)</h3>")
+        told = "Segments: each begins where the one before ends (positions in mm: X, Y or X, Y, Z)"
+        head = Html(f"<h2 class=rds-part>{told}</h2>")
         self.children = [head, *self._rows, self._refusal, buttons]
 
 

@@ -18,7 +18,7 @@ def row(*children: Any) -> widgets.HBox:
 
 def group(title: str, *children: Any) -> widgets.VBox:
     """Controls under a heading."""
-    box = widgets.VBox([Html(f"<h3>{title}</h3>"), *children])
+    box = widgets.VBox([Html(f"<h2 class=rds-part>{title}</h2>"), *children])
     box.add_class("rds-group")
     return box
 

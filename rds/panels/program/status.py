@@ -10,7 +10,7 @@ from rds.core.types import Ending
 from rds.machines import Machine
 from rds.modes.loop.execution import State
 from rds.nc.active import Modes, modes_at
-from rds.nc.run.run import Status
+from rds.nc.run.run import LOCKS, Status
 from rds.results import Result
 
 STATES = (
@@ -45,10 +45,13 @@ def at_the_end(status: Status, result: Result) -> Status:
 def _head(status: Status | None, override: float, modes: Modes | None) -> str:
     if status is None:
         return '<p class="rds-state" role="status">Nothing runs. Positions show here as soon as a run has begun.</p>'
+    lock = LOCKS.get(status.whose_feed)
+    locked = f" <b>({lock})</b>" if lock else ""
     return (
         f'<p class="rds-state" role="status"><b>Line {status.line}</b> {STATES[status.state]} · '
         f"{status.time:.1f} s · {status.share:.0%} of the program</p>"
-        f'<p class="rds-state">Feed <b>{status.feed:.0f}</b> mm/min{_wanted(modes)}, override {override:.0f} %</p>'
+        f'<p class="rds-state">Feed <b>{status.feed:.0f}</b> mm/min{_wanted(modes)}, override {override:.0f} %'
+        f"{locked}</p>"
     )
 
 

@@ -39,6 +39,7 @@ _SENSES = {1: "counter-clockwise", -1: "clockwise"}
 _CELLS = 720  # of a turn
 _NOISE = 3.0  # standard deviations of the readings: what is smaller is no cause
 _SHARE, _LEAST = 0.01, 0.05  # of G, which the terms, of first order, do not tell; µm
+_SPIRAL = 0.2  # of G in a turn: what is less is no spiral
 _LEFT = 0.5  # of G: where the terms leave more than this, the form is another
 _HEADS = (
     "run",
@@ -114,6 +115,9 @@ class CircularTest:
         rough = max(float(np.std(np.diff(_polar(arc, self.centre)[1], 2))) / 6**0.5 for arc in arcs)
         self.rows = [self._row([arc]) for arc in arcs] + ([self._row(arcs)] if len(arcs) > 1 else [])
         self.level = max(1e3 * arcs[0].resolution, 1e3 * _NOISE * rough, _SHARE * self.rows[-1][7], _LEAST)
+        spiral = [_spiral(arc, self.centre) for arc in arcs]
+        least = max(self.level, _SPIRAL * self.rows[-1][7])
+        self.spiral = [change if abs(change) > least else 0.0 for change in spiral]  # µm in a turn, of each direction
         self._diagnose(settings["spike"])
 
     def _row(self, arcs: Sequence[Arc]) -> list[Any]:
@@ -130,7 +134,13 @@ class CircularTest:
     def _fit(self) -> tuple[np.ndarray, list[float], np.ndarray]:
         """The terms, each axis's play in µm, and what they leave in each cell of each arc; `level` and `left`."""
         angle = (np.arange(_CELLS) + 0.5) * 2 * pi / _CELLS
-        off = np.concatenate([_in_cells(*_polar(arc, self.centre), self.radius) for arc in self.arcs])
+        places = [_polar(arc, self.centre) for arc in self.arcs]
+        turns = [_turns(at) for at, _ in places]  # a spiral is left out: half of it would be an ellipse
+        places = [
+            (at, r - 1e-3 * change * (turn - turn.mean()))
+            for (at, r), turn, change in zip(places, turns, self.spiral, strict=True)
+        ]
+        off = np.concatenate([_in_cells(at, r, self.radius) for at, r in places])
         s, a = np.repeat([arc.sense for arc in self.arcs], _CELLS), np.tile(angle, len(self.arcs))
         terms = [np.where(s == arc.sense, f, 0.0) for arc in self.arcs for f in (np.ones(len(a)), np.cos(a), np.sin(a))]
         terms += [np.cos(2 * a), np.sin(2 * a), s * np.sin(2 * a)][: 3 if len(self.arcs) > 1 else 2]
@@ -221,6 +231,12 @@ class CircularTest:
             for arc in self.arcs
             if arc.steady < 360
         ]
+        said += [
+            f"{_SENSES[arc.sense]}: the radius changes by {change:+.3g} µm in a turn: the path is a spiral, from a "
+            "drift or a program; it is in G, and the causes are of what is left without it."
+            for arc, change in zip(self.arcs, self.spiral, strict=True)
+            if change
+        ]
         if len(self.arcs) < 2:
             said.append(f"there is no G(b), for lack of a circle {_SENSES[-self.arcs[0].sense]}; measure it, too.")
         said += [f"{what} {axis}: {value:+.3g} {unit} ({how})." for what, axis, value, unit, how in self.causes]
@@ -255,6 +271,7 @@ class CircularTest:
         axes.set_rlim(-7.5 * step, 3 * step)  # the reference circle is 7.5 steps in radius
         ticks = step * np.arange(-3, 4)
         axes.set_rgrids(ticks, [f"{tick:+g} µm" if tick else "0" for tick in ticks], angle=67.5, fontsize="x-small")
+        axes.set_axisbelow(False)  # the labels of the rings are above the curve
         for label in axes.get_yticklabels():
             label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6})
         names = {0: f"+{self.axes[0]}", 90: f"+{self.axes[1]}", 180: f"-{self.axes[0]}", 270: f"-{self.axes[1]}"}
@@ -268,6 +285,21 @@ def _polar(arc: Arc, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Angle (rad, 0 to 2 pi) and radius (mm) of each point."""
     x, y = (arc.points - centre).T
     return np.arctan2(y, x) % (2 * pi), np.hypot(x, y)
+
+
+def _turns(angle: np.ndarray) -> np.ndarray:
+    """Turns gone at each point."""
+    return np.abs(np.unwrap(angle) - angle[0]) / (2 * pi)
+
+
+def _spiral(arc: Arc, centre: np.ndarray) -> float:
+    """By how much the radius changes in a turn, µm: steadily, and not back again as after a reversal."""
+    angle, radii = _polar(arc, centre)
+    shape = [np.ones(len(angle)), _turns(angle), *(f(k * angle) for k in (1, 2) for f in (np.cos, np.sin))]
+    steady = 1e3 * float(np.linalg.lstsq(np.column_stack(shape), radii - radii.mean(), rcond=None)[0][1])
+    ends = max(len(radii) // 72, 1)
+    apart = 1e3 * float(radii[-ends:].mean() - radii[:ends].mean()) if arc.steady >= 360 else 0.0
+    return steady if 0.5 < apart / (steady or 1.0) < 2.0 else 0.0
 
 
 def _reversal(travel: np.ndarray, play: float, radius: float) -> np.ndarray:
