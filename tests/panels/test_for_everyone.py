@@ -90,13 +90,3 @@ def test_the_keyboard_runs_and_stops_and_what_comes_of_it_is_read_out(
     page.keyboard.press("Escape")
     page.wait_for_selector('[aria-live=polite] :text("ended early: stopped"):visible')
     assert not page.locator('.rds-notice:has-text("emergency stop")').count()  # the run, and nothing more
-    for begun in (True, False):  # from another panel, also where there is no Stop yet
-        page.click("button.rds-run:visible")
-        if begun:
-            page.wait_for_selector('.rds-work:has-text("running"):visible')
-        page.click('.rds-nav button:text-is("Jog")')
-        page.wait_for_selector('.rds-title h1:text-is("Jog")')
-        page.keyboard.press("Escape")
-        page.click('.rds-nav button:text-is("Equipment control")')
-        page.wait_for_selector('[aria-live=polite] :text("ended early: stopped"):visible')
-        page.wait_for_selector(".rds-work:visible", state="hidden")

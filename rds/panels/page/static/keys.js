@@ -1,5 +1,5 @@
 // A panel without a mouse. Ctrl+Enter presses its Run, Escape its Stop, which ends the run and is no emergency stop; of a
-// run whose Stop is not in sight yet it is pressed as soon as it is, and where nothing runs in this panel, that of another one. What folds away is opened by Enter or space. The list
+// run whose Stop is not in sight yet it is pressed as soon as it is. What folds away is opened by Enter or space. The list
 // of panels is one stop of Tab, within which arrows move. Labels belong to their fields, and what is said in a notice is
 // read out. A panel begins at its top, however far the one before was scrolled. And JupyterLab, whose cells are deleted and
 // run by keys, hears none that is meant for a panel: dd on a button would delete the cell that shows it.
@@ -48,11 +48,10 @@ function render({ el }) {
   let pending = false, unwanted = false; // Run was pressed, and then Escape, before there was a Stop
   const chosen = (button) => { pending = button?.matches(RUN) ?? false; unwanted = false; };
   const clicked = (event) => { // by hand: those that others make of a press come later
-    if (!event.isTrusted || !(event.target instanceof Element) || !app.contains(event.target)) return;
-    if (!event.target.closest(".rds-nav button")) chosen(event.target.closest("button")); // another panel does not end what runs
+    if (event.isTrusted && event.target instanceof Element && app.contains(event.target)) chosen(event.target.closest("button"));
   };
   const stop = () => {
-    const button = press(STOP) ?? away();
+    const button = press(STOP);
     if (button) {
       pending = unwanted = false;
       button.click();
@@ -62,8 +61,6 @@ function render({ el }) {
     }
   };
   const press = (which) => [...app.querySelectorAll(which)].find((each) => each.offsetParent && !each.disabled);
-  const away = () => [...app.querySelectorAll(`.rds-away ${STOP}`)] // the Stop of what runs in a panel that is not in sight
-    .find((each) => !each.disabled && each.closest(".rds-work").style.display !== "none");
   const keep = (event) => { // but for Ctrl+S and the like; what has the focus says so itself
     const { target, key } = event;
     if (app.contains(target)) target.toggleAttribute(NOT_OF_LAB, !(event.ctrlKey || event.metaKey) || key === "Enter");
@@ -89,7 +86,7 @@ function render({ el }) {
       all[(all.indexOf(event.target) + STEPS[event.key] + all.length) % all.length].focus();
     }
   };
-  const watch = setInterval(() => { if (unwanted) stop(); else if (pending && (press(STOP) ?? away())) pending = false; }, LOOK);
+  const watch = setInterval(() => { if (unwanted) stop(); else if (pending && press(STOP)) pending = false; }, LOOK);
   let due = 0;
   const seen = new MutationObserver((changes) => {
     due ||= setTimeout(() => { due = 0; label(); }, 50); // once for what comes together
