@@ -76,8 +76,8 @@ LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it 
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One worker more than there are processors: the two kinds that run one by one wait for most of their time."""
-    return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)) + 1
+    """Two more than there are processors: the two kinds that run one by one wait for most of their time."""
+    return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)) + 2
 
 
 @pytest.hookimpl(trylast=True)

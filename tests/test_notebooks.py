@@ -93,7 +93,7 @@ def _check_grading(notebook: nbformat.NotebookNode, folder: Path) -> None:
     """What the text says of the class is so."""
     said = "\n".join(_said(cell) for cell in notebook.cells if cell.cell_type == "code")
     assert "it can be given out" in said and "hidden criteria, not tried here: 2 worth 20.0 points" in said
-    assert "ada and finn" in said and "my folder: ['submission.py']" in said
+    assert "ada and finn" in said and "my folder: ['emil.py']" in said
     assert "left out: {'finn': " in said
     rows = csv.DictReader((folder / "grades/grades.csv").read_text(encoding="utf-8-sig").splitlines())
     points = {row["student"]: (row["status"], float(row["score"])) for row in rows}

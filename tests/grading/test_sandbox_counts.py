@@ -129,7 +129,7 @@ sys.gettrace = sys.getprofile = lambda: kept[-1]
 import sys
 for name, module in list(sys.modules.items()):
     if name.startswith("rds.grading.sandbox"):
-        for word in ("counted", "Counted", "counter", "_counted", "_codes"):
+        for word in ("counted", "RunCount", "counter", "_counted", "_codes"):
             if hasattr(module, word): setattr(module, word, lambda *a: None)
 """,
     "what is told is another": """
@@ -173,7 +173,7 @@ WAYS = {
 frame = sys._getframe()
 while frame:
     for value in list(getattr(frame, "f_locals", {}).values()):
-        if type(value).__name__ == "Counted": [look(each) for each in value]
+        if type(value).__name__ == "RunCount": [look(each) for each in value]
     frame = frame.f_back
 """,
         "forget()",
@@ -196,7 +196,7 @@ def total(self):
     look(tuple.__getitem__(self, 3))
     forget()
     return tuple.__getitem__(self, 3)
-sys.modules["rds.grading.sandbox.inside.counting"].Counted.total = property(total)
+sys.modules["rds.grading.sandbox.inside.counting"].RunCount.total = property(total)
 """,
         "",
     ),

@@ -61,7 +61,7 @@ class Interpreter:
         self._is_ready = True
 
     def fork(self, request: Mapping[str, Any], fds: Sequence[int]) -> None:
-        """A new cell with the inner ends `fds` of its channels (`inside.warm.Ends`)."""
+        """A new cell with the inner ends `fds` of its channels (`inside.warm.ChannelEnds`)."""
         self.wait()
         self._send(json.dumps(request).encode(), fds)
 
