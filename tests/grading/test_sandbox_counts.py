@@ -11,6 +11,7 @@ import pytest
 
 from rds.core.types import LineSegment, Reference
 from rds.grading.sandbox import Limits, Pool, WorkCounts
+from rds.grading.sandbox.inside import counting, runs
 
 Written = Callable[..., Path]
 WORK = """
@@ -129,7 +130,7 @@ sys.gettrace = sys.getprofile = lambda: kept[-1]
 import sys
 for name, module in list(sys.modules.items()):
     if name.startswith("rds.grading.sandbox"):
-        for word in ("counted", "Counted", "counter", "_counted", "_codes"):
+        for word in ("counted", "RunCount", "counter", "_counted", "_codes"):
             if hasattr(module, word): setattr(module, word, lambda *a: None)
 """,
     "what is told is another": """
@@ -173,7 +174,7 @@ WAYS = {
 frame = sys._getframe()
 while frame:
     for value in list(getattr(frame, "f_locals", {}).values()):
-        if type(value).__name__ == "Counted": [look(each) for each in value]
+        if type(value).__name__ == "RunCount": [look(each) for each in value]
     frame = frame.f_back
 """,
         "forget()",
@@ -196,7 +197,7 @@ def total(self):
     look(tuple.__getitem__(self, 3))
     forget()
     return tuple.__getitem__(self, 3)
-sys.modules["rds.grading.sandbox.inside.counting"].Counted.total = property(total)
+sys.modules["rds.grading.sandbox.inside.counting"].RunCount.total = property(total)
 """,
         "",
     ),
@@ -339,6 +340,13 @@ def control(t, r, y, state, params):
     work()
     return min(abs(r.position - y), 1.0), state
 """
+
+
+def test_the_attacks_reach_for_the_counter_by_its_name() -> None:
+    """Of a class that is called otherwise by now they would find nothing, and prove nothing."""
+    name = counting.RunCount.__name__
+    told = (WAYS["the frames above it"][0], WAYS["the class that holds it"][0], FORGED["the counter is another"])
+    assert all(name in text for text in told) and callable(runs._begun)
 
 
 @pytest.mark.parametrize("way", WAYS)
