@@ -41,7 +41,7 @@ class Rules(NamedTuple):
     """Of a text format: what is wrong with a line, and whether it should have given a frame (None: a comment).
 
     `opening` is a line that the reader needs above the first line that is no heading: it passes over the next one.
-    `handed` is a line as the reader takes it for what it is.
+    `handed` makes of a line what the reader understands as the same frame.
     """
 
     check: Callable[[str, int], str | None]
