@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 def known_keywords(function: Callable[P, T]) -> Callable[P, T]:
-    """The function, which answers an unknown keyword argument as unknown words of a TOML file are answered."""
+    """The function, which refuses an unknown keyword argument with an InputError that names the nearest known one."""
     parameters = signature(function).parameters.values()
     if any(each.kind is Parameter.VAR_KEYWORD for each in parameters):
         return function

@@ -94,7 +94,7 @@ def load_error(error: BaseException, file: Path) -> InputError:
         remedy = "a notebook that was saved as Python has such lines: remove them, or hand in the notebook itself"
     elif isinstance(error, PermissionError):
         remedy = "where files are graded there is no network, which asyncio.run() needs as well, no other program, and "
-        remedy += "no folder to write to but the current one: do without"
+        remedy += "no folder to write to but the current one: remove what needs them"
     elif type(error) is ImportError and "relative import" in str(error):
         remedy = "import a file next to it by its name alone, without the dot; what is graded must be in one file"
     else:

@@ -176,21 +176,21 @@ def test_a_hub_ends_although_a_node_had_more_to_send_than_others_stayed_for(
     assert process.wait(30) == 0
 
 
-def test_a_board_for_which_there_is_no_room_is_refused(
+def test_a_file_of_error_states_for_which_there_is_no_room_is_refused(
     open_bus: Opener, runtime_directory: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A hub that wrote where a full disk had no page was killed."""
-    path = runtime_directory / "board"
-    board = ErrorStateFile(path)
+    path = runtime_directory / "states"
+    states = ErrorStateFile(path)
     assert path.stat().st_blocks * 512 >= SEATS
-    board.remove()
+    states.remove()
     with monkeypatch.context() as patched, pytest.raises(OSError, match="No space left"):
         patched.setattr(os, "write", lambda descriptor, data: 512)
         ErrorStateFile(path)
     assert not path.exists()
     (runtime_directory / "rds").mkdir(mode=0o700, exist_ok=True)
     (runtime_directory / "rds" / "test.states").mkdir()
-    with pytest.raises(can.CanInitializationError, match="refused: the board of the bus cannot be made"):
+    with pytest.raises(can.CanInitializationError, match="refused: the file of its error states cannot be made"):
         open_bus(bitrate=500_000)
 
 

@@ -449,7 +449,7 @@ def test_the_machine_brings_its_own_faults(program: Callable[..., Any], tmp_path
     assert other.wait(30) == 2 and f"{schedule}, line 2" in other.stderr.read()
 
 
-def test_the_board_and_the_hub_leave_nothing_behind(
+def test_the_error_states_and_the_hub_leave_nothing_behind(
     hub: Callable[..., Any], open_bus: Callable[..., can.BusABC], runtime_directory: Path
 ) -> None:
     process = hub("test", "--linger", "0.5")

@@ -75,10 +75,10 @@ LOADING = {
 }
 
 
-@pytest.fixture(scope="module", params=["door", "pipes"])
+@pytest.fixture(scope="module", params=["memory", "pipes"])
 def either(request: pytest.FixtureRequest, pool: Pool) -> Iterator[Pool]:
     """A pool that has a processor for each side, if this computer has two, and one that has not."""
-    if request.param == "door":
+    if request.param == "memory":
         yield pool
         return
     with Pool(jobs=64, slot=0) as made:

@@ -11,6 +11,7 @@ import pytest
 
 from rds.core.types import LineSegment, Reference
 from rds.grading.sandbox import Limits, Pool, WorkCounts
+from rds.grading.sandbox.inside import counting, runs
 
 Written = Callable[..., Path]
 WORK = """
@@ -339,6 +340,13 @@ def control(t, r, y, state, params):
     work()
     return min(abs(r.position - y), 1.0), state
 """
+
+
+def test_the_attacks_reach_for_the_counter_by_its_name() -> None:
+    """Of a class that is called otherwise by now they would find nothing, and prove nothing."""
+    name = counting.RunCount.__name__
+    told = (WAYS["the frames above it"][0], WAYS["the class that holds it"][0], FORGED["the counter is another"])
+    assert all(name in text for text in told) and callable(runs._begun)
 
 
 @pytest.mark.parametrize("way", WAYS)

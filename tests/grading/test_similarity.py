@@ -222,7 +222,9 @@ def test_a_copy_in_a_text_that_is_run_is_told() -> None:
         Outcome(1, ({1: (1, 1)}, ())),
         Outcome(2, failure=Failure.DIED, reason="it <died>"),
     ]
-    found = [left_out for *_, left_out in _read(["ada", "bob", "cid"], iter(done))]
-    assert found == [Uncompared("ada", ((4, 5),)), None, Uncompared("cid", (), "it <died>")]
+    done.append(Outcome(3, fingerprints_and_text(b"def control(:\n")))
+    found = [left_out for *_, left_out in _read(["ada", "bob", "cid", "dan"], iter(done))]
+    nothing = Uncompared("dan", (), "Python cannot read it, or it is too short")
+    assert found == [Uncompared("ada", ((4, 5),)), None, Uncompared("cid", (), "it <died>"), nothing]
     shown = found_html(json.loads(alike_json([], uncompared=[each for each in found if each])))
     assert "4–5" in shown and "runs text" in shown and "it &lt;died&gt;" in shown and "bob" not in shown

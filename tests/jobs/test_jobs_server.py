@@ -210,9 +210,8 @@ def test_a_simulation_that_waits_is_left_behind_once_it_is_stopped(
     jobs.stop(waits.number)
     wait_for(lambda: other.state == "over", 20.0)
     assert "did not end within" in waits.status()["error"] and other.status()["ending"] == "done"
-    (
-        tmp_path / "over"
-    ).touch()  # the thread that was left behind goes back to its folder, also in the tests after this one
+    # The thread that was left behind goes back to its folder; it would do so in the tests after this one.
+    (tmp_path / "over").touch()
     for thread in threading.enumerate():
         if thread.name == f"job {waits.number}":
             thread.join(20.0)

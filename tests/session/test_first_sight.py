@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from rds.panels.page.first_visit import RATE, Alive, first_sight
+from rds.panels.page.first_visit import RATE, FirstVisit, first_sight
 from rds.panels.session import Session
 
 
@@ -27,7 +27,7 @@ def test_it_is_simulated_once_the_page_is_in_sight(tmp_path: object) -> None:
             calls.append(call)
             return calls.clear
 
-    alive, sent = Alive(Session(str(tmp_path)), Ticker()), []
+    alive, sent = FirstVisit(Session(str(tmp_path)), Ticker()), []
     alive.send = lambda content, buffers=None: sent.append(buffers)
     assert alive._task is None
     alive._asked(None, {"kind": "here"}, None)

@@ -38,7 +38,7 @@ class Address:
         self.path = self.directory / (channel + _SUFFIXES[0 if self.unix else 1])
         self.lock_path = self.directory / f"{channel}.lock"
         self.log_path = self.directory / f"{channel}.log"
-        self.board_path = self.directory / f"{channel}.states"
+        self.error_states_path = self.directory / f"{channel}.states"
         self.token = bytes(32)  # set by listen() and connect() where the transport needs one
 
     def listen(self) -> socket.socket:

@@ -91,9 +91,8 @@ class BuiltinBus(can.BusABC):
         self._pid = os.getpid()
         try:
             connection = connect.join(self._channel, bool(receive_own_messages), wanted, settings)
-            self._error_states = (
-                ErrorStateReader(Address(self._channel).board_path, connection.node) if connection.bitrate else None
-            )
+            states = Address(self._channel).error_states_path
+            self._error_states = ErrorStateReader(states, connection.node) if connection.bitrate else None
         except OSError as error:
             raise can.CanInitializationError(f"{self.channel_info}: {error}") from error
         self._sock = connection.sock

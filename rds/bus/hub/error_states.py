@@ -1,4 +1,4 @@
-"""The board of a channel with bit timing: every node's error state in a file that all can see at no cost.
+"""The error state of every node of a channel with bit timing, in a file that all can read at no cost.
 
 So send() knows that its node is bus off without asking the hub. One byte for each seat; a node's seat is its number
 modulo `SEATS`. The hub writes, nodes read.
@@ -45,7 +45,7 @@ class ErrorStateFile:
 
 
 class ErrorStateReader:
-    """A node's end: its own state on the board at `path`. OSError if there is none."""
+    """A node's end: its own state in the file at `path`. OSError if there is none."""
 
     def __init__(self, path: Path, number: int):
         with open(path, "rb") as file:

@@ -81,8 +81,8 @@ class Hub(HubNodes):
             # one that was still greeting sees the end without a word, and looks for the next hub
             if node.state is not State.GONE:
                 self._part(node)
-        if self._board is not None:
-            self._board.remove()
+        if self._error_states is not None:
+            self._error_states.remove()
         self._listener.close()
         self._poller.close()
 

@@ -33,7 +33,7 @@ class HubNodes:
         self._poller.register(self._listener.fileno(), READ)
         self._medium: Medium[Node] = UntimedMedium()
         self._requests = Requests(self._medium, self._note, time.monotonic_ns())
-        self._board: ErrorStateFile | None = None
+        self._error_states: ErrorStateFile | None = None
         self._paused: set[Node] = set()  # those whose controllers are full
         self._nodes: dict[int, Node] = {}  # by file descriptor
         self._members: list[Node] = []  # those on the bus
@@ -106,23 +106,23 @@ class HubNodes:
         node.state = State.JOINED
         restart = None if settings.restart_ms < 0 else settings.restart_ms * 1_000_000
         medium.join(node, Station(node.number, settings.name, settings.error_frames, restart), now)
-        if self._board is not None:
-            self._board.show(node.number, 0)
+        if self._error_states is not None:
+            self._error_states.show(node.number, 0)
         self._members.append(node)
         self._routes.clear()
 
     def _choose_medium(self, settings: wire.Settings) -> Medium[Node]:
         """What the first node asks for."""
-        if self._board is not None:
-            self._board.remove()
-            self._board = None
+        if self._error_states is not None:
+            self._error_states.remove()
+            self._error_states = None
         if settings.bitrate:
             from rds.bus.medium.timed_medium import TimedMedium  # the untimed bus starts without its tables
 
             try:
-                self._board = ErrorStateFile(self._address.board_path)
+                self._error_states = ErrorStateFile(self._address.error_states_path)
             except OSError as error:
-                raise wire.WireError(f"the board of the bus cannot be made: {error.strerror}") from error
+                raise wire.WireError(f"the file of its error states cannot be made: {error.strerror}") from error
             self._medium = TimedMedium(settings.bitrate, settings.data_bitrate or None, self._show)
         else:
             self._medium = UntimedMedium()
@@ -131,8 +131,8 @@ class HubNodes:
 
     def _show(self, node: Node, station: Station) -> None:
         """A controller's error state has changed."""
-        if self._board is not None:
-            self._board.show(node.number, station.counters.state)
+        if self._error_states is not None:
+            self._error_states.show(node.number, station.counters.state)
 
     def _welcome(self, number: int) -> wire.Welcome:
         return wire.Welcome(number, os.getpid(), self._medium.bitrate, self._medium.data_bitrate or 0)

@@ -52,8 +52,8 @@ def open_bus(
     """An open bus that receives the standard frames whose identifier, masked, is one of `identifiers` (None: all).
 
     `node` is what the built-in bus calls this node; `options` go to the interface as they are (bitrate, fd...).
-    Raises MachineError if the bus can't be opened, InputError for one that leaves this computer (beyond.py) unless the
-    option `beyond_this_computer` is true.
+    Raises MachineError if the bus can't be opened, InputError for one that leaves this computer (network_channels.py)
+    unless the option `beyond_this_computer` is true.
     """
     import can
 

@@ -21,9 +21,8 @@ _CANDUMP = re.compile(
     r"(R\d*|#[0-9A-F]([0-9A-F]{2}){0,64}|([0-9A-F]{2}){0,64})(\s+[RT])?",
     re.IGNORECASE,
 )
-_ERROR = re.compile(
-    r"(?<=\s)[23][0-9A-F]{7}(?=#)", re.IGNORECASE
-)  # SocketCAN's identifier of an error frame: its classes
+# SocketCAN's identifier of an error frame: the classes of the error, of which 0x80 is a bus error
+_ERROR = re.compile(r"(?<=\s)[23][0-9A-F]{7}(?=#)", re.IGNORECASE)
 _BUS_ERROR = 0x80
 # time, channel, identifier and, if it was not cut off there, the direction: an event has a word for an identifier
 _ASC_FRAME = re.compile(r"\d+\.\d+\s+(CANFD\s+)?\d+(\s+(Rx|Tx))?(\s+[0-9A-F]+x?(\s.*)?)?", re.IGNORECASE)
@@ -42,7 +41,7 @@ class Rules(NamedTuple):
     """Of a text format: what is wrong with a line, and whether it should have given a frame (None: a comment).
 
     `opening` is a line that the reader needs above the first line that is no heading: it passes over the next one.
-    `handed` is a line as the reader takes it for what it is.
+    `handed` makes of a line what the reader understands as the same frame.
     """
 
     check: Callable[[str, int], str | None]

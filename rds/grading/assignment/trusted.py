@@ -43,7 +43,7 @@ class TrustedFiles:
 
 
 class TrustedFile:
-    """As `sandbox.Subject`, in this process. Each run that is begun loads the file afresh."""
+    """As `sandbox.LoadedSubmission`, in this process. Each run that is begun loads the file afresh."""
 
     output = said_loading = ""  # it prints where its author sees it
 

@@ -41,6 +41,7 @@ from rds.grading.grade import AS_SOLUTION, BEHAVIOUR
 from rds.grading.intake import collect
 
 _PATIENCE = 600.0  # s for one file
+_NOTHING = "Python cannot read it, or it is too short"  # of a program without a fingerprint
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,8 @@ def _read(names: Iterable[str], done: Iterator[Outcome]) -> Iterator[tuple[str, 
     for name in names:
         outcome = next(done)
         prints, lines = outcome.value if outcome.ok else ({}, ())
-        yield name, prints, Uncompared(name, lines, outcome.reason) if lines or not outcome.ok else None
+        why = outcome.reason if not outcome.ok else "" if prints or lines else _NOTHING
+        yield name, prints, Uncompared(name, lines, why) if lines or why else None
 
 
 def _can_tell(assignment: Assignment) -> bool:

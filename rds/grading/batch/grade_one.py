@@ -50,7 +50,7 @@ class Opener(Protocol):
         """Whether its subjects' `counts` hold events."""
 
     def open(self, path: str | Path, limits: Limits | None, kind: str) -> Any:
-        """A context manager with the methods of `sandbox.Subject`."""
+        """A context manager with the methods of `sandbox.LoadedSubmission`."""
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ _NOTE = (
     "where to look, and no finding. No points depend on it."
 )
 _UNCOMPARED = (
-    "What a program runs by exec, eval or compile stands in a text, which may come from somebody else's program and is "
-    "not compared. Read these lines."
+    "These programs, or these lines of them, are not compared; read them. What a program runs by exec, eval or compile "
+    "stands in a text, which may come from somebody else's program."
 )
 _LOOPS = (
     "In all cases that are the same for everybody these runs are equal to the last bit, whatever the programs look "

@@ -85,7 +85,7 @@ def graded(setup: Setup, task: Task) -> Answer:
     began = time.monotonic()
     with scratch("submission") as folder:
         path = folder / safe_name(python_name(task.about))
-        assert task.path or task.code is not None  # where no folder is shared
+        assert task.path or task.code is not None  # the code comes with the task where no folder is shared
         code = Path(task.path).read_bytes() if task.code is None else task.code.read()
         write_private(path, code, is_own=True)
         found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)

@@ -20,7 +20,7 @@ Row = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 
 
 class Answers(Protocol):
-    """A loaded submission, as `sandbox.Subject` is: see there."""
+    """A loaded submission, as `sandbox.LoadedSubmission` is: see there."""
 
     @property
     def output(self) -> str: ...

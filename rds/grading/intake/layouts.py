@@ -371,10 +371,9 @@ def _is_one_s_name(folder: str) -> bool:
 
 
 def _platform(items: Sequence[Item]) -> str:
-    """The platform that calls most of the files that may be submissions so, and more than half; empty if none does.
+    """The platform whose kind of name most files have that may be submissions; empty unless more than half have it.
 
-    Of two, the one that fits more of them: what a name ends with is the student's choice, and could be what another
-    platform writes, but only in that student's own files.
+    A student chooses how a file's name ends, and may make it fit another platform; so what fits the most files counts.
     """
     counted = [item for item in items if item.is_code or item.is_archive]
     fits = {

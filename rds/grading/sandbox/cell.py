@@ -55,14 +55,14 @@ class Cell:
         self._status.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
         most = budget.limits.output_bytes
         self.output = Output(printed, max(most - budget.printed, 0), max(FLOOD * most - budget.printed, 0))
-        self.door = (make_memory(), make_bell(), make_bell())
-        inner = (inner_questions, inner_answers, inner_output, *self.door, inner_status.detach())
+        self.shared = (make_memory(), make_bell(), make_bell())
+        inner = (inner_questions, inner_answers, inner_output, *self.shared, inner_status.detach())
         try:
             limits = {key: getattr(budget.limits, key) for key in budget.limits.__dataclass_fields__}
             try:
                 interpreter.fork({"limits": limits, "cpus": list(cpus)}, inner)
             finally:
-                for descriptor in set(inner) - set(self.door):
+                for descriptor in set(inner) - set(self.shared):
                     os.close(descriptor)
             self._process = self._started()
             self._handle = os.pidfd_open(self._process)
@@ -196,7 +196,7 @@ class Cell:
 
     def _close_ends(self) -> None:
         """The grader's ends of all channels."""
-        for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door):
+        for descriptor in (self.questions, self.answers, self.output.descriptor, *self.shared):
             os.close(descriptor)
         self._status.close()
 

@@ -52,13 +52,13 @@ class LoadedSubmission:
         limits: Limits,
         interpreter: Callable[[], Interpreter],
         supervisor: Supervisor,
-        place: Processors,
+        processors: Processors,
     ):
         if kind not in KINDS:
             raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
         self.limits = limits
         self._submission, self._kind = submission, kind
-        self._interpreter, self._supervisor, self._place = interpreter, supervisor, place
+        self._interpreter, self._supervisor, self._processors = interpreter, supervisor, processors
         self._budget = Budget(limits)
         self._counting = Budget(limits)  # what all counted runs together have used up
         self._printed: list[str] = []
@@ -70,7 +70,7 @@ class LoadedSubmission:
         self._order: Mapping[str, Any] = {}
         self._counts: WorkCounts | None = None
         self._affinity = os.sched_getaffinity(0)
-        os.sched_setaffinity(0, place.own)
+        os.sched_setaffinity(0, processors.own)
         try:
             self._load()
         except SubmissionError as error:
@@ -193,7 +193,7 @@ class LoadedSubmission:
         first = run.recorded(most_samples)
         try:
             cell = self._load(budget, {**order, "seal": seal})
-            self._answer(cell, {**order, "through_door": False}, generous.call_seconds, Status.BROKE_CONTRACT)
+            self._answer(cell, {**order, "through_memory": False}, generous.call_seconds, Status.BROKE_CONTRACT)
             again = Run(cell, run.what, run.layout, run.T, seal=seal)
             return count_again(first, again)
         except SubmissionError as error:
@@ -236,10 +236,10 @@ class LoadedSubmission:
         if cell is None or cell.is_closed or not self._is_fresh:
             cell = self._load()
         self._is_fresh, self._counts = False, None
-        through_door = self._place.apart and order["op"] != "rows"
-        whole = {**order, "through_door": through_door}
+        through_memory = self._processors.apart and order["op"] != "rows"
+        whole = {**order, "through_memory": through_memory}
         answer = self._answer(cell, whole, self.limits.call_seconds, Status.BROKE_CONTRACT)
-        self._run, self._order = Run(cell, str(order["op"]), layout, T, through_door), order
+        self._run, self._order = Run(cell, str(order["op"]), layout, T, through_memory), order
         return answer
 
     def _generous(self) -> Limits:
@@ -254,7 +254,7 @@ class LoadedSubmission:
         """A fresh cell, with the submission loaded in it; `counted` is the order of the run whose work is counted."""
         self._leave()
         interpreter = self._interpreter()  # its start is not the submission's time
-        self._cell = cell = Cell(interpreter, budget or self._budget, self._supervisor, self._place.inner)
+        self._cell = cell = Cell(interpreter, budget or self._budget, self._supervisor, self._processors.inner)
         self._run, self._is_fresh = None, True
         text = base64.b64encode(self._submission.data).decode()
         order = {"kind": self._kind, "name": self._submission.name, "text": text, "counted": counted}

@@ -66,9 +66,9 @@ class Pool:
         """
         submission = read_submission(Path(path))
         kit = _kit([name for name in KITS[-1] if submission.imports(name)])
-        place = Processors.of(self._jobs, self._slot)
+        processors = Processors.of(self._jobs, self._slot)
         return LoadedSubmission(
-            submission, kind, limits or Limits(), lambda: self._interpreter(kit), self._supervisor, place
+            submission, kind, limits or Limits(), lambda: self._interpreter(kit), self._supervisor, processors
         )
 
     def close(self) -> None:

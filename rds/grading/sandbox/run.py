@@ -22,12 +22,12 @@ Sample = tuple[tuple[float, ...], tuple[float, ...]]
 class Run:
     """A run of `what` (control, model, rows) with samples of `T` s, begun in `cell`. `k` is the next sample.
 
-    With `through_door` question and answer go through shared memory, else through the cell's pipes. A counted run's
+    With `through_memory` question and answer go through shared memory, else through the cell's pipes. A counted run's
     answers carry a `seal`.
     """
 
     def __init__(
-        self, cell: Cell, what: str, layout: records.Layout, T: float, through_door: bool = False, seal: int = 0
+        self, cell: Cell, what: str, layout: records.Layout, T: float, through_memory: bool = False, seal: int = 0
     ):
         self.cell, self.what, self.layout, self.T = cell, what, layout, T
         self.is_single = layout.answers == 1
@@ -36,12 +36,12 @@ class Run:
         self._seal, self._ok = seal, records.OK ^ seal
         self._asked: list[tuple[float, ...]] = []
         self._answered: list[tuple[Any, ...]] = []
-        self._door: SharedChannel | None = None
-        if through_door:
-            memory, question_bell, answer_bell = cell.door
-            self._door = SharedChannel(memory, answer_bell, question_bell, cell.answers, asks=True)
+        self._shared: SharedChannel | None = None
+        if through_memory:
+            memory, question_bell, answer_bell = cell.shared
+            self._shared = SharedChannel(memory, answer_bell, question_bell, cell.answers, asks=True)
             cell.signs.append(self._has_answer)
-        self._exchange = self._door.asker(layout) if self._door else self._pipes()
+        self._exchange = self._shared.asker(layout) if self._shared else self._pipes()
 
     def ask(self, *values: float) -> tuple[Any, ...]:
         """Sample number, code, answer to `values`, all finite; SubmissionError if there is none, or to something else.
@@ -81,12 +81,12 @@ class Run:
         return exchange
 
     def close(self) -> None:
-        """Let go of the door; what was recorded stays."""
-        if self._door is not None:
-            self._door.close()
+        """Let go of the shared memory; what was recorded stays."""
+        if self._shared is not None:
+            self._shared.close()
 
     def _has_answer(self) -> bool:
-        return self._door is not None and self._door.has_come_to(self.k + 1)
+        return self._shared is not None and self._shared.has_come_to(self.k + 1)
 
     def recorded(self, most: int | None = None) -> list[Sample]:
         """What was asked and answered so far, of the first `most` samples."""

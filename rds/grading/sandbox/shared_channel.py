@@ -33,13 +33,13 @@ _ADD_SEALS = 1033
 
 
 def can_be_used() -> bool:
-    """Whether this processor's memory is ordered as the door needs it."""
+    """Whether this processor's memory is ordered as this needs it."""
     return platform.machine() in ("x86_64", "AMD64")
 
 
 def make_memory() -> int:
     """The descriptor of shared memory whose size nobody can change."""
-    descriptor = os.memfd_create("rds-door", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+    descriptor = os.memfd_create("rds-channel", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
     os.ftruncate(descriptor, SIZE)
     fcntl.fcntl(descriptor, _ADD_SEALS, _SEALS)
     return descriptor

@@ -188,7 +188,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
 
 
 def _short_heading(above: Sequence[str], delimiter: str, decimal: str, names: Sequence[str]) -> str:
-    """The line above the data, where it has words, two or more, but fewer than there are columns without a name."""
+    """The line above the data, if it has two words or more but fewer cells than the rows, and no column has a name."""
     line = next((line for line in reversed(above) if line.strip()), "")
     cells = split(line, delimiter)
     named = any(name != f"column {i + 1}" for i, name in enumerate(names))

@@ -27,7 +27,7 @@ TAU, K, PLUS, MINUS, VISCOUS, STRIBECK, STRIBECK_VELOCITY, OFFSET, DEAD_ZONE, DE
 # The initial states: position behind the play, velocity, place in the play (-1 to 1); as columns after the parameters.
 POSITION, VELOCITY, PLAY = range(11, 14)
 COLUMNS = 14
-SUBSTEP = 0.25e-3  # s, as rds.models.machine_axis.SUBSTEP
+SUBSTEP = 0.25e-3  # s, as rds.models.machine_motion.SUBSTEP
 _SAME = 1e-12  # s: instants closer than this are one
 
 

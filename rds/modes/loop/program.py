@@ -118,7 +118,7 @@ class InterpolatedProgram:
     notes: tuple[str, ...] = ()
     name: str = ""
     blu: float = 0.0
-    overrides: tuple[tuple[int, float], ...] = ()  # whose the feed is after a segment: its index, FREE_FEED and so on
+    overrides: tuple[tuple[int, float], ...] = ()  # after which segment, and whose the feed is then: FREE_FEED, ...
 
 
 def dwell_samples(seconds: float, T: float) -> int:

@@ -98,7 +98,8 @@ _LANGUAGES = tuple(
         ),
         (
             r"(?:n[0-9]+)?(?:a?(?:trans|rot|scale|mirror)(?:$|[;xyzr])|cycle[0-9]+\(|mcall|msg\(|r[0-9]+="
-            r"|def(?:real|int|bool|string)|goto[bfc]|(?:pocket|slot|holes)[0-9]\(|if[r$])|[^(;<#$]*(?:[a-z]{2}=|[a-z][0-9]*=(?:[a-z]|\"))",
+            r"|def(?:real|int|bool|string)|goto[bfc]|(?:pocket|slot|holes)[0-9]\(|if[r$])"
+            r"|[^(;<#$]*(?:[a-z]{2}=|[a-z][0-9]*=[a-z\"])",
             _SIEMENS,
         ),
         (r"(?:n[0-9]+)?(?:[bd]prnt\[|popen$|pclos$)", _PRINTED),

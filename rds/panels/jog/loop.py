@@ -1,9 +1,9 @@
 """The loop that jogs, in a process of its own: `python -m rds.panels.jog.loop MACHINE DIALECT BUS`, BUS in JSON.
 
-Orders come as lines of JSON on stdin (jog_orders.py), what the machine does goes out on stdout, REPORTS times a second.
-A hold ends unless it is said again within DEAD_MAN s, a spindle's turning within SPINDLE_DEAD_MAN s. When stdin ends,
-whoever gave orders has died: no voltage, drives by a quick stop. Should this process die, the modules' own watchdogs
-cut the voltage after ten periods, and drives stop when SYNC and heartbeat stay away.
+Commands come as lines of JSON on stdin (jog_commands.py), what the machine does goes out on stdout, REPORTS times a
+second. A hold ends unless it is said again within DEAD_MAN s, a spindle's turning within SPINDLE_DEAD_MAN s. When stdin
+ends, whoever gave commands has died: no voltage, drives by a quick stop. Should this process die, the modules' own
+watchdogs cut the voltage after ten periods, and drives stop when SYNC and heartbeat stay away.
 """
 
 from __future__ import annotations

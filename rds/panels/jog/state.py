@@ -1,4 +1,4 @@
-"""Jogging: axes and spindles moved by hand. The loop is a process of its own (jog_loop.py)."""
+"""Jogging: axes and spindles moved by hand. The loop is a process of its own (loop.py)."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _REFERENCE = {"kind": "sinusoid", "amplitude": 5.0, "frequency": 0.5}
 _PERIODS = 2  # simulated; the last one is shown, again and again
 
 
-class Alive(anywidget.AnyWidget):
+class FirstVisit(anywidget.AnyWidget):
     """Empty until the page asks; then one period of time (s), reference, measured and error (mm)."""
 
     _esm = traitlets.Unicode().tag(sync=True)

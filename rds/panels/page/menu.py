@@ -9,7 +9,7 @@ import ipywidgets as widgets
 
 from rds.panels.kit.button import button
 from rds.panels.kit.html import Html
-from rds.panels.page.first_visit import Alive
+from rds.panels.page.first_visit import FirstVisit
 from rds.panels.registry import PANELS
 
 NAME = "menu"
@@ -72,7 +72,7 @@ def _first(shell: Any) -> widgets.Widget:
         line = widgets.HBox([press, Html(f"<p>{text}</p>")])
         line.add_class("rds-first-step")
         rows.append(line)
-    first = widgets.HBox([Alive(shell.session, shell.ticker), widgets.VBox(rows)])
+    first = widgets.HBox([FirstVisit(shell.session, shell.ticker), widgets.VBox(rows)])
     first.add_class("rds-first")
     return first
 

@@ -232,8 +232,8 @@ class CircularTest:
             if arc.steady < 360
         ]
         said += [
-            f"{_SENSES[arc.sense]}: the radius changes by {change:+.3g} µm in a turn: the path is a spiral, from a "
-            "drift or a program; it is in G, and the causes are of what is left without it."
+            f"{_SENSES[arc.sense]}: the radius changes by {change:+.3g} µm in a turn: the path is a spiral, by a "
+            "drift or by the program. G contains it; the causes are computed without it."
             for arc, change in zip(self.arcs, self.spiral, strict=True)
             if change
         ]

@@ -15,7 +15,8 @@ while frame is not None:
     frame = frame.f_back
 for each in gc.get_objects():
     if str(type(each).__module__).startswith("rds.") and type(each).__name__ in (
-        "Assignment", "Case", "CaseRun", "Criterion", "Pool", "Subject", "Result", "Signal", "Grade", "Limits"):
+        "Assignment", "Case", "CaseRun", "Criterion", "Pool", "LoadedSubmission", "OpenSubmission", "Result", "Signal",
+        "Grade", "Limits", "ControlCase", "ModelCase", "SegmentCase"):
         found.append(type(each).__name__)
 assert not found, found
 """

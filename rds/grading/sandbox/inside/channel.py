@@ -18,18 +18,18 @@ Send = Callable[..., None]
 
 
 class Channel:
-    """Frames of text and records of fixed size over the descriptors `questions` and `answers`, or through the door."""
+    """Frames of text and records of fixed size, over the descriptors `questions` and `answers` or shared memory."""
 
     def __init__(self, questions: int, answers: int, memory: int, question_bell: int, answer_bell: int):
         self.questions, self.answers = questions, answers
-        self._door = (memory, question_bell, answer_bell)
+        self._shared = (memory, question_bell, answer_bell)
 
-    def records(self, layout: Layout, through_door: bool) -> tuple[Receive, Send]:
+    def records(self, layout: Layout, through_memory: bool) -> tuple[Receive, Send]:
         """Functions: one takes the next question (number, doubles), one gives its answer (number, code, doubles)."""
         unpack, pack, size = layout.question.unpack, layout.answer.pack, layout.question.size
-        if not through_door:
+        if not through_memory:
             return lambda: unpack(self.receive(size)), lambda *answer: self.send(pack(*answer))
-        return SharedChannel(*self._door, self.questions, asks=False).answerer(layout)
+        return SharedChannel(*self._shared, self.questions, asks=False).answerer(layout)
 
     def receive(self, count: int) -> bytes:
         """Exactly `count` bytes."""

@@ -163,7 +163,7 @@ def _begun(
 ) -> tuple[Receive, Send]:
     """What questions and answers go through; what is counted is so from now on."""
     if counted is None:
-        return channel.records(layout, order["through_door"])
+        return channel.records(layout, order["through_memory"])
     counted.begin()
     return counted.receive, counted.send
 

@@ -34,7 +34,7 @@ class ChannelEnds(NamedTuple):
     questions: int
     answers: int
     output: int
-    memory: int  # of the door, and its bells
+    memory: int  # shared with the grader, and its bells
     question_bell: int
     answer_bell: int
     status: int  # of init alone
@@ -133,7 +133,7 @@ def _submission(
         os.dup2(ends.output, 2)
         os.dup2(os.open("/dev/null", os.O_RDONLY), 0)
         kept = (ends.questions, ends.answers, ends.memory, ends.question_bell, ends.answer_bell)
-        questions, answers, *door = (fcntl.fcntl(fd, fcntl.F_DUPFD, _ABOVE) for fd in kept)
+        questions, answers, *shared = (fcntl.fcntl(fd, fcntl.F_DUPFD, _ABOVE) for fd in kept)
         walls.confine(request["limits"], baseline, calls, request["cpus"])
     except BaseException as error:
         status.send(f"broken: {type(error).__name__}: {error}".encode()[:500])
@@ -142,7 +142,7 @@ def _submission(
     os.closerange(3, _ABOVE)
     code = 1
     try:
-        code = worker.main(questions, answers, door)
+        code = worker.main(questions, answers, shared)
         sys.stdout.flush()
     except BaseException:  # whatever it is: a submission never gets back into the code that put up its walls
         traceback.print_exc()

@@ -34,9 +34,9 @@ _OWN = ("rds.checks.rows", "rds.core.types", "rds.core.values", "rds.machines.co
 _MOST_NAMES = 1000  # that are told of a file
 
 
-def main(questions: int, answers: int, door: list[int]) -> int:
-    """Serve one submission; the process's exit code. `door` is its memory and bells."""
-    channel = Channel(questions, answers, *door)
+def main(questions: int, answers: int, shared: list[int]) -> int:
+    """Serve one submission; the process's exit code. `shared` is the memory shared with the grader, and its bells."""
+    channel = Channel(questions, answers, *shared)
     for name, descriptor in (("stdout", 1), ("stderr", 2)):
         vars(sys)[name] = vars(sys)[f"__{name}__"] = _stream(descriptor)
     _seed()
