@@ -433,6 +433,12 @@ def test_words_of_other_quantities_beside_a_command_and_a_position_take_none_awa
     assert np.allclose(log.position, X, atol=1e-5)
 
 
+@pytest.mark.parametrize("first", ["PAR1 [V]", "TDSm [V]"])
+def test_a_heading_that_begins_as_a_foreign_file_does_is_a_heading(tmp_path: Path, first: str) -> None:
+    (log,) = read_log(written(tmp_path, "log.csv", f"{first},time [s],x [mm]\n", [U, 0.001 * T, X], ","))
+    assert np.allclose(log.command, U, atol=1e-5)
+
+
 def test_a_name_that_is_passed_over_is_told_with_the_remedy(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="by its name 'Motor torque load side' is another quantity; if it is the comm"):
         read_log(written(tmp_path, "log.csv", "time [s],Motor torque load side [Nm],x [mm]\n", [0.001 * T, U, X], ","))
