@@ -226,9 +226,9 @@ def _keep_this_process() -> None:
     def instead_of(name: str) -> Callable[..., Any]:
         ours = getattr(os, name)
 
-        def call(*given: Any) -> Any:
+        def call(*given: Any, **named: Any) -> Any:
             if os.getpid() != server or (name == "kill" and (given[:1] != (server,) or given[1:] == (0,))):
-                return ours(*given)
+                return ours(*given, **named)
             raise SystemExit(f"os.{name}() would have ended the server of jobs; remove it")
 
         return call

@@ -62,6 +62,7 @@ BA_ "VFrameFormat" BO_ 512 14;
         ("", (True, True)),
         (switch.format(1, 0), (True, False)),
         (switch.format(0, 1), (False, True)),
+        (switch.replace('"0","1"', '"No","Yes"').format("No", 1), (False, True)),
     ):
         (tmp_path / "car.dbc").write_text(fd + more)
         found = {m.name: m for m in read_messages(tmp_path / "car.dbc", period=0.1).messages}

@@ -209,6 +209,8 @@ def test_who_names_files_as_moodle_does_decides_for_nobody_else(form: str, stude
     files: dict[str, str | bytes] = {form.format(*who, "controller.py"): "own" for who in [("ada", 0), ("bob", 1)]}
     files |= {form.format("eve", 2, f"x_1_assignsubmission_file_{n}.py"): "own" for n in range(9)}
     assert list(of(zipped(tmp_path / "all.zip", files))) == students
+    alone = {form.format("eve", 2, "x_1_assignsubmission_file_law.py"): "own"}
+    assert list(of(zipped(tmp_path / "one.zip", alone))) == students[2:]  # a class of one
 
 
 def test_blackboard_s_zip_has_the_newest_attempt_of_each_student(tmp_path: Path) -> None:

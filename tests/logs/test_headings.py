@@ -414,6 +414,36 @@ def test_what_was_not_measured_or_drives_nothing_is_not_guessed(tmp_path: Path, 
         read_log(written(tmp_path, "log.csv", head + "\n", [0.001 * T, U, X], ","))
 
 
+@pytest.mark.parametrize(
+    ("command", "position"),
+    [
+        ("External command [V]", "Load position [mm]"),
+        ("Command voltage after limit [V]", "Motor encoder position [mm]"),
+        ("Analog command input [V]", "Position offset corrected [mm]"),
+        ("Motorspannung Encoder 1 [V]", "Position after backlash compensation [mm]"),
+    ],
+)
+def test_words_of_other_quantities_beside_a_command_and_a_position_take_none_away(
+    tmp_path: Path, command: str, position: str
+) -> None:
+    """Neither the current nor the speed stands in for them."""
+    head = f"time [s],{command},{position},Motor current [A],Speed [mm/s]\n"
+    (log,) = read_log(written(tmp_path, "log.csv", head, [0.001 * T, U, X, 0.5 * U, 0.0 * X + 1.0], ","))
+    assert np.allclose(log.command, U, atol=1e-5) and log.units["command"] == "V"
+    assert np.allclose(log.position, X, atol=1e-5)
+
+
+@pytest.mark.parametrize("first", ["PAR1 [V]", "TDSm [V]"])
+def test_a_heading_that_begins_as_a_foreign_file_does_is_a_heading(tmp_path: Path, first: str) -> None:
+    (log,) = read_log(written(tmp_path, "log.csv", f"{first},time [s],x [mm]\n", [U, 0.001 * T, X], ","))
+    assert np.allclose(log.command, U, atol=1e-5)
+
+
+def test_a_name_that_is_passed_over_is_told_with_the_remedy(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="by its name 'Motor torque load side' is another quantity; if it is the comm"):
+        read_log(written(tmp_path, "log.csv", "time [s],Motor torque load side [Nm],x [mm]\n", [0.001 * T, U, X], ","))
+
+
 def test_the_motor_s_current_is_the_command_beside_the_voltage_of_its_supply(tmp_path: Path) -> None:
     head = "time [s],DC link voltage [V],Motor current [A],Position [mm],Current limit [A]\n"
     (log,) = read_log(written(tmp_path, "log.csv", head, [0.001 * T, 0.0 * X + 560.0, U, X, 0.0 * X + 9.0], ","))

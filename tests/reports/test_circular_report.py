@@ -238,6 +238,15 @@ def test_a_spiral_is_said_and_is_no_ellipse(tmp_path: Path, change: float) -> No
     assert said == pytest.approx([change, change], rel=0.01)
 
 
+def test_a_centre_that_drifts_along_an_axis_is_no_spiral(tmp_path: Path) -> None:
+    """A drift of 13 µm in a turn was a spiral of 7 µm, and what is left without that a reversal step."""
+    table = ideal(1)
+    table[:, 1] += np.linspace(0.0, 0.03, len(table))
+    report = report_of(tmp_path, table)
+    assert not any("spiral" in text for text in report.findings)
+    assert not {"reversal step"} & {cause for cause, _ in causes(report)}
+
+
 def test_a_reading_that_is_off_and_a_drift_are_no_friction(tmp_path: Path) -> None:
     """A spike stands at most reversals of its axis; these once were spikes of 250 and 3 µm."""
     glitch, drift = both_ways(), both_ways()

@@ -26,6 +26,7 @@ _COLUMNS = (
 _YES, _NO = ("1", "yes", "true", "x"), ("", "0", "no", "false")
 _HIGHEST_STANDARD = 0x7FF
 _SWITCH = "CANFD_BRS"
+_OFF = ("0", "no", "off", "false")
 _NO_MESSAGE = "VECTOR__INDEPENDENT_SIG_MSG"  # where Vector's editor keeps signals of no message
 
 
@@ -89,12 +90,12 @@ def _of_dbc(path: Path, period: float | None) -> MessageTable:
 
 
 def _switches_rate(entry: Any, database: Any) -> bool:
-    """Whether a CAN FD frame's data go at the data bit rate, by Vector's words "0", "1"; yes if absent."""
+    """Whether a CAN FD frame's data go at the data bit rate: Vector's words are "0", "1"; yes if absent."""
     attribute = entry.dbc.attributes.get(_SWITCH)
     if attribute is not None:
-        return str(attribute.value) != "0"
+        return str(attribute.value).lower() not in _OFF
     definition = database.dbc.attribute_definitions.get(_SWITCH)
-    return definition is None or str(definition.default_value) != "0"
+    return definition is None or str(definition.default_value).lower() not in _OFF
 
 
 def _of_csv(path: Path, period: float | None) -> MessageTable:

@@ -374,16 +374,20 @@ def _platform(items: Sequence[Item]) -> str:
     """The platform whose kind of name most files have that may be submissions; empty unless more than half have it.
 
     A student chooses how a file's name ends, and may make it fit another platform; so what fits the most files counts.
+    Of two that fit as many, as in a class of one, the one that leaves the student more of the names.
     """
     counted = [item for item in items if item.is_code or item.is_archive]
-    fits = {
-        "moodle": sum(bool(_MOODLE.fullmatch(item.parts[0])) for item in counted),
-        "brightspace": sum(bool(_BRIGHTSPACE.fullmatch(item.parts[0])) for item in counted),
-        "canvas": sum(len(item.parts) == 1 and bool(_CANVAS.fullmatch(item.name)) for item in counted),
-        "blackboard": sum(len(item.parts) == 1 and bool(_BLACKBOARD.fullmatch(item.name)) for item in counted),
+    flat = [item.name for item in counted if len(item.parts) == 1]
+    firsts = [item.parts[0] for item in counted]
+    forms = {
+        "moodle": (_MOODLE, firsts),
+        "brightspace": (_BRIGHTSPACE, firsts),
+        "canvas": (_CANVAS, flat),
+        "blackboard": (_BLACKBOARD, flat),
     }
-    best = max(fits, key=lambda name: fits[name])
-    return best if 2 * fits[best] > len(counted) else ""
+    fits = {of: [found for name in names if (found := form.fullmatch(name))] for of, (form, names) in forms.items()}
+    best = max(fits, key=lambda of: (len(fits[of]), sum(len(found["file"] or "") for found in fits[of])))
+    return best if 2 * len(fits[best]) > len(counted) else ""
 
 
 def _is_vpl(items: Sequence[Item]) -> bool:

@@ -48,20 +48,28 @@ _OTHERS = _words(
     "modelled simulated model error err acceleration accel acc difference diff deviation lag temperature temp "
     "fehler abweichung regelabweichung schleppfehler schleppabstand temperatur"
 )
-# what drives nothing: supplies, what sensors answer, limits, what acts on the axis from outside
+# what drives nothing: supplies, and where no command is named, what sensors answer and what acts from outside
 _SUPPLIES = _words(
-    "supply bus battery batt vbus vbat dclink zwischenkreisspannung versorgungsspannung batterie "
-    "vdc udc zk uzk rail mains netzspannung "
-    "sensor tacho tachometer tachogenerator potentiometer poti encoder resolver lvdt strain loadcell cell ain "
-    "limit limits limitation grenze maximum minimum max min "
+    "supply bus battery batt vbus vbat dclink sensor zwischenkreisspannung versorgungsspannung batterie "
+    "vdc udc zk uzk rail mains netzspannung"
+)
+_SUPPLY_PAIRS = ({"dc", "link"},)
+_NO_DRIVES = _words(
+    "tacho tachometer tachogenerator potentiometer poti encoder resolver lvdt strain loadcell cell ain "
     "friction disturbance external load reaction contact cutting process reibung reibmoment lastmoment stoermoment"
 )
-_SUPPLY_PAIRS = ({"dc", "link"}, {"analog", "input"})
-# lengths and angles that are no position
+_NO_DRIVE_PAIRS = ({"analog", "input"},)
+_COMMANDS = _words(
+    "command cmd commanded setpoint demand stellgroße stellgroesse stellsignal sollspannung sollstrom sollmoment "
+    "sollkraft motorspannung ankerspannung"
+)
+# bounds, and lengths and angles that are no position; but what is corrected by them, or comes behind them, is one
+_BOUNDS = _words("limit limits limitation grenze maximum minimum max min")
 _NO_PLACES = _words(
     "offset compensation correction tolerance thickness diameter backlash electrical commutation phase "
     "limit limits limitation max min"
 )
+_BEHIND = _words("after with without corrected compensated nach mit ohne korrigiert kompensiert")
 _ACTING = (("voltage",), ("force", "torque"), ("current",))
 _RISING = 0.9  # of the steps of a time go up
 _NO_LOG = "it is no log over time"
@@ -364,6 +372,7 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
             roles = (quantity, None, "velocity" if quantity == "position" else None)  # a speed will do
             strange = [c for c in measured if _is_strange(c) and _role(c.name) in roles]
             doubt += "".join(f"; {c.name!r}: {_unknown(c, quantity)}" for c in strange[:_TOLD])
+            doubt += _passed_over(measured, quantity)
             if quantity == "command" and (parts := [c for c in measured if dimension(c.unit or "") == "ratio"]):
                 told = " or ".join(f"{c.name} [{c.unit}]" for c in parts[:_TOLD])
                 doubt += f"; where {told} is the command, say so in a map"
@@ -382,6 +391,14 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
         if len(fits) == 1:
             found[quantity] = fits[0]
     return found, ""
+
+
+def _passed_over(columns: Sequence[Column], quantity: str) -> str:
+    """What to do where a column has a unit of the quantity, and a word in its name tells that it is another."""
+    is_other = _drives_nothing if quantity == "command" else _is_no_place
+    others = [c.name for c in columns if dimension(c.unit or "") in DIMENSIONS[quantity] and is_other(c.name)]
+    named = " or ".join(map(repr, others[:_TOLD]))
+    return f"; by its name {named} is another quantity; if it is the {quantity}, say so in a map" if named else ""
 
 
 def _is_of(reference: Column | None, answer: Column | None) -> bool:
@@ -413,7 +430,7 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
     if quantity == "current":
         fits = [c for c in fits if not _drives_nothing(c.name)]
     if quantity in ("position", "velocity"):
-        fits = [c for c in fits if not _NO_PLACES & {word.lower() for word in _tokens(c.name)}]
+        fits = [c for c in fits if not _is_no_place(c.name)]
     if quantity == "reference":
         return [c for c in fits if _role(c.name) in ("reference", "command")]  # a command position is one
     if quantity != "command":
@@ -433,7 +450,15 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
 def _drives_nothing(name: str) -> bool:
     """Whether a voltage, current or force of this name is none that drives the axis."""
     words = {word.lower() for word in _tokens(name)}
-    return bool(_SUPPLIES & words) or any(pair <= words for pair in _SUPPLY_PAIRS)
+    if _SUPPLIES & words or any(pair <= words for pair in _SUPPLY_PAIRS) or (_BOUNDS & words and not _BEHIND & words):
+        return True
+    return not _COMMANDS & words and bool(_NO_DRIVES & words or any(pair <= words for pair in _NO_DRIVE_PAIRS))
+
+
+def _is_no_place(name: str) -> bool:
+    """Whether a length, angle or speed of this name is not that of the axis."""
+    words = {word.lower() for word in _tokens(name)}
+    return bool(_NO_PLACES & words) and not _BEHIND & words
 
 
 def _likely(columns: Sequence[Column], quantity: str) -> Column | None:

@@ -27,9 +27,12 @@ _TEXT = (  # where the ending is one of text
         re.compile(rb"PK\x03\x04"),
         "it is a zip, as spreadsheets (.xlsx) are, too: unpack it, or save the sheet with the samples as CSV (UTF-8)",
     ),
-    (re.compile(rb"PAR1"), "it is Parquet: let its name end in .parquet"),
+    (re.compile(rb"PAR1[\0-\x08\x0e-\x1f]"), "it is Parquet: let its name end in .parquet"),
     (re.compile(rb"\x89HDF"), "it is HDF5: save time, command and position as columns of CSV"),
-    (re.compile(rb"TDSm"), "it is NI's TDMS: let its name end in .tdms, and `rds` says which export is read"),
+    (
+        re.compile(rb"TDSm.\0", re.DOTALL),
+        "it is NI's TDMS: let its name end in .tdms, and `rds` says which export is read",
+    ),
 )
 _OSCILLOSCOPE = re.compile(rb"(#9\d{9})?WAVEDESC")  # LeCroy's, whose files end in .trc as those of CAN tools do
 _OCTAVE = b"# Created by Octave"

@@ -295,7 +295,9 @@ def _turns(angle: np.ndarray) -> np.ndarray:
 def _spiral(arc: Arc, centre: np.ndarray) -> float:
     """By how much the radius changes in a turn, µm: steadily, and not back again as after a reversal."""
     angle, radii = _polar(arc, centre)
-    shape = [np.ones(len(angle)), _turns(angle), *(f(k * angle) for k in (1, 2) for f in (np.cos, np.sin))]
+    turns = _turns(angle)
+    shape = [np.ones(len(angle)), turns, *(f(k * angle) for k in (1, 2) for f in (np.cos, np.sin))]
+    shape += [turns * np.cos(angle), turns * np.sin(angle)]  # a centre that drifts
     steady = 1e3 * float(np.linalg.lstsq(np.column_stack(shape), radii - radii.mean(), rcond=None)[0][1])
     ends = max(len(radii) // 72, 1)
     apart = 1e3 * float(radii[-ends:].mean() - radii[:ends].mean()) if arc.steady >= 360 else 0.0
