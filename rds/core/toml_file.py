@@ -48,6 +48,8 @@ def read_toml(path: str | Path) -> tuple[dict[str, Any], str]:
     try:
         data = read_limited(path, LARGEST, "a TOML file", "keep data in a file of their own, such as CSV")
         text = data.decode("utf-8-sig")
+    except IsADirectoryError as error:
+        raise InputError("it is a folder; name the TOML file", where) from error
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}; check the path", where) from error
     except UnicodeDecodeError as error:

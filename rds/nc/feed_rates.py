@@ -77,6 +77,8 @@ class FeedRates:
             self._assume(ProgramError(message, file=file, line=line))
 
     def _no_feed(self, turning: int, speed: float) -> str:
+        if self.pitch:  # the spindle is on, else its word is refused
+            return "a thread at S0 moves nothing; give a spindle speed before"
         if self.per_revolution and not turning:
             return "a feed per revolution (G95) while the spindle stands still moves nothing; start it (S, M3)"
         if self.per_revolution and not speed:

@@ -98,6 +98,11 @@ def test_the_limits_are_lifted_by_the_environment(tmp_path: Path, monkeypatch: p
             read_toml(path)
 
 
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="it is a folder; name the TOML file"):
+        read_toml(tmp_path)
+
+
 def test_a_device_without_an_end_is_no_file() -> None:
     with pytest.raises(InputError, match="too many for a TOML file"):
         read_toml("/dev/zero")

@@ -180,6 +180,13 @@ def test_a_solution_that_was_handed_out_is_named_as_the_source() -> None:
     assert pair.source == ""
 
 
+def test_of_pairs_as_much_alike_those_that_nothing_explains_come_first() -> None:
+    found = prints(ada=OTHER, ben=OTHER, cy=LAW, di=disguised(LAW))
+    assert [(pair.first, pair.score) for pair in similar_pairs(found)] == [("ada", 1.0), ("cy", 1.0)]
+    pairs = similar_pairs(found, sources={"solution.py": fingerprints(OTHER.encode())})
+    assert [(pair.first, pair.source) for pair in pairs] == [("cy", ""), ("ada", "solution.py")]
+
+
 def test_the_table_escapes_names() -> None:
     pairs = similar_pairs(prints(**{"<b>": LAW, "ben": disguised(LAW)}))
     shown = found_html(json.loads(alike_json(pairs)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -405,6 +406,7 @@ def test_dspace_s_x_is_drafted_as_the_time(tmp_path: Path) -> None:
         ("time [s],Peak current limit [A],Position [mm]", "command"),
         ("time [s],Torque limit [Nm],Position [mm]", "command"),
         ("time [s],Load torque [Nm],Position [mm]", "command"),
+        ("time [s],Brake torque [Nm],Position [mm]", "command"),
         ("time [s],Torque [Nm],Z offset [mm]", "position"),
         ("time [s],Voltage [V],Electrical angle [deg]", "position"),
     ],
@@ -449,6 +451,14 @@ def test_the_motor_s_current_is_the_command_beside_the_voltage_of_its_supply(tmp
     (log,) = read_log(written(tmp_path, "log.csv", head, [0.001 * T, 0.0 * X + 560.0, U, X, 0.0 * X + 9.0], ","))
     assert np.allclose(log.command, U, atol=1e-5) and log.units["command"] == "A"
     assert "current" not in log.extra
+
+
+def test_a_draft_has_no_supply_or_load_for_the_command_either(tmp_path: Path) -> None:
+    head = "Time [s],DC link voltage,Motor current,load torque,Encoder position [mm]\n"
+    table = read_table(written(tmp_path, "log.csv", head, [0.001 * T, 0.0 * X + 560.0, U, X, X], ","))
+    (axis,) = tomllib.loads(draft(table))["axis"].values()
+    assert axis["command"] == {"column": "Motor current", "unit": "?"} and "current" not in axis
+    assert axis["position"] == {"column": "Encoder position", "unit": "mm"}
 
 
 def test_a_heading_with_fewer_names_than_columns_is_told(tmp_path: Path) -> None:

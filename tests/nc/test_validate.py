@@ -123,6 +123,7 @@ def test_a_valid_program_and_what_is_told_of_it(tmp_path: Path) -> None:
         ("T1 M6\nM3 S8001\n", (2, 4, "S8001"), "8001 rev/min is more than the tool table allows tool 1 (8000)"),
         ("T3 M6\n", (1, 1, "T3"), "the tool table has no tool 3"),
         ("G0 X1\nG1 X2\n", (2, 0, ""), "feed rate"),
+        ("M3\nG33 Z-1 K1\n", (2, 0, ""), "a thread at S0 moves nothing; give a spindle speed"),
         ("G10 L2 P1 R30\nF60\nG18 G2 X10 I5\n", (3, 5, "G2"), "lies in no plane"),
     ],
 )

@@ -247,7 +247,10 @@ def test_a_command_in_another_unit_than_the_model_s_is_refused_with_a_remedy() -
         validate(candidate(), drive)
     estimate = fit([drive], structure("axis"))
     assert estimate.parameters["K"].unit == "(mm/s)/A"
-    assert validate(estimate, replace(drive, name="again")).candidate.structure.command_unit == "A"
+    found = validate(estimate, replace(drive, name="again"))
+    assert found.candidate.structure.command_unit == "A"
+    assert "the current that the model needs for the measured motion" in str(found)
+    assert "current error, RMS [A]" in found._repr_html_() and "voltage" not in str(found)
 
 
 def test_a_longer_log_is_not_overfitting() -> None:

@@ -189,7 +189,7 @@ class _Programs:
         self._share(known)
 
     def pairs(self, sources: Mapping[str, Fingerprints]) -> list[Pair]:
-        """The most alike first."""
+        """The most alike first; of those that are as much alike, those with no common source, then the longest."""
         lines = lru_cache(_KEPT)(self._lines)
         found = []
         for first in range(self._students):
@@ -201,7 +201,7 @@ class _Programs:
                 one, two = (lines(owner, common.tobytes()) for owner in ends)
                 source = source if most >= LEAST_SCORE * len(values) else ""
                 found.append(Pair(self._names[ends[0]], self._names[ends[1]], score, len(values), one, two, source))
-        return sorted(found, key=lambda pair: (-pair.score, pair.first, pair.second))
+        return sorted(found, key=lambda pair: (-pair.score, pair.source != "", -pair.common, pair.first, pair.second))
 
     def _put(self, programs: Iterable[Program]) -> None:
         for name, prints in programs:

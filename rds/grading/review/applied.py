@@ -9,7 +9,6 @@ from typing import Any
 
 from rds.grading.assignment.late_rules import LateRules, moved
 from rds.grading.course.class_list import Member
-from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.grading.review.entries import Entry, Kind
 
@@ -103,9 +102,9 @@ def _marked(score: CriterionScore, marks: Sequence[Entry]) -> CriterionScore:
     counted = [final] if final is not None else list(_last_of_each(marks).values())
     points = _rounded(mean(each.value or 0.0 for each in counted))
     band = Band.FULL if points >= score.max_score else Band.PARTIAL if points > 0.0 else Band.NONE
-    who = ", ".join(f"{one_line(each.by, 60)} ({each.value:g})" for each in counted)
-    # the value and the sentence of the measurement stay: what was measured is not a grader's to change
-    said = f"{score.sentence} Set by hand to {points:g} points, from {score.score:g} as measured: {who}."
+    # The value and the sentence of the measurement stay: what was measured is not a grader's to change. The student
+    # reads it, so it names no grader; the trail in the class's page does.
+    said = f"{score.sentence} Set by hand to {points:g} points, from {score.score:g} as measured."
     return replace(score, score=points, band=band, sentence=said.strip(), gate="")
 
 

@@ -119,7 +119,7 @@ def note(estimate: Estimate) -> str:
         "estimated; so many samples ahead starts from the position measured at each sample."
     )
     if estimate.relative_error_percent is not None:
-        said += f" Voltage or force that the model needs beside the one given: {estimate.relative_error_percent:.2f} %."
+        said += f" Command that the model needs beside the one given: {estimate.relative_error_percent:.2f} %."
     return said
 
 

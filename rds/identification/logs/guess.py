@@ -56,7 +56,8 @@ _SUPPLIES = _words(
 _SUPPLY_PAIRS = ({"dc", "link"},)
 _NO_DRIVES = _words(
     "tacho tachometer tachogenerator potentiometer poti encoder resolver lvdt strain loadcell cell ain "
-    "friction disturbance external load reaction contact cutting process reibung reibmoment lastmoment stoermoment"
+    "friction disturbance external load brake braking reaction contact cutting process "
+    "reibung reibmoment lastmoment stoermoment bremsmoment"
 )
 _NO_DRIVE_PAIRS = ({"analog", "input"},)
 _COMMANDS = _words(
@@ -146,6 +147,8 @@ def draft(table: Table) -> str:
     axes: dict[str, object] = {}
     for name, columns in _groups(table, time).items():
         parts = {q: _likely(columns, q) for q in ("command", "position", "velocity", "current", "force", "reference")}
+        if parts["command"] is None:  # as a guess takes it
+            parts["command"], parts["current"] = parts["current"], None
         if parts["force"] is parts["command"]:
             del parts["force"]
         if not _is_of(parts["reference"], parts["position"] or parts["velocity"]):
@@ -470,6 +473,7 @@ def _likely(columns: Sequence[Column], quantity: str) -> Column | None:
         for c in measured
         if _role(c.name) == quantity
         and (c.unit is None or _is_strange(c) or (quantity == "command" and dimension(c.unit) == "ratio"))
+        and not (quantity in ("command", "current") and _drives_nothing(c.name))
     ]
     chosen = [*fits, *named] if any(_role(c.name) == quantity for c in fits) else [*named, *fits]
     return next(iter(chosen), None)

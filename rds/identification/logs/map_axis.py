@@ -79,7 +79,6 @@ def axes_of(words: TomlTable, machine: Machine | None) -> dict[str, AxisMap]:
 
 def _axis(name: str, words: TomlTable, machine: Machine | None) -> AxisMap:
     columns = {q: _column(words, q) for q in QUANTITIES if q in words}
-    _check_columns(name, columns, words)
     of = words.read("machine_axis")
     if of is not None and machine is None:
         raise words.fault("machine_axis", 'names an axis of no machine; add machine = "mini-cnc" at the top')
@@ -101,7 +100,8 @@ def _axis(name: str, words: TomlTable, machine: Machine | None) -> AxisMap:
         voltage_range=_range(words),
         place=words.place(),
     )
-    words.done()
+    words.done()  # before what is missing: a misspelt `position` is there
+    _check_columns(name, columns, words)
     return made
 
 

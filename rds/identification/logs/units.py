@@ -105,6 +105,12 @@ def unit_of_name(name: str) -> str | None:
     return ending if stem and ending in _ENDINGS else None
 
 
+def acting(unit: str) -> str:
+    """What a command in this unit is: a voltage, current, force or torque; of a share it is the command."""
+    found = dimension(unit)
+    return found if found in ("voltage", "current", "force", "torque") else "command"
+
+
 def plain(unit: str) -> str:
     """A unit as the table spells it: µ in either of its two codes is u; `rpm` is rev/min. Not checked."""
     text = unit.strip().replace("µ", "u").replace("μ", "u").replace("⁻¹", "-1").replace(" ", "")

@@ -8,6 +8,7 @@ from math import inf, log10, sqrt
 
 from rds.identification.fit.estimate import said_of_guesses
 from rds.identification.fit.kstep import over_noise
+from rds.identification.logs.units import acting
 from rds.identification.validate.assessment import Assessment, largest
 from rds.identification.validate.candidate import Candidate
 from rds.identification.validate.conclusion import UNTOLD, conclude, sentence_of
@@ -221,21 +222,20 @@ def _ahead(a: Assessment, bands: Bands) -> Iterator[Reason]:
 def _voltage(a: Assessment, bands: Bands) -> Iterator[Reason]:
     if a.voltage is None or a.motion == 0.0:
         return
-    percent = a.voltage.relative_percent
+    unit, percent = a.ranges["command"].unit, a.voltage.relative_percent
     if percent is None:
         yield Reason(
             Side.NOTE,
             "voltage",
-            f"no voltage error: {len(a.voltage.extra)} blocks of steady direction are too few, or the model does not "
-            "answer to voltage there",
+            f"no {acting(unit)} error: {len(a.voltage.extra)} blocks of steady direction are too few, or the model "
+            f"does not answer to the {acting(unit)} there",
         )
         return
-    unit = a.ranges["command"].unit
     beyond = Side.NOTE if slight(a, bands) else Side.AGAINST  # of a slow or noisy motion, blocks tell little
     yield Reason(
         Side.FOR if percent <= bands.voltage_percent else beyond,
         "voltage",
-        f"the voltage that the model needs for the measured motion differs by {percent:.2f} % "
+        f"the {acting(unit)} that the model needs for the measured motion differs by {percent:.2f} % "
         f"(RMS {a.voltage.rmse:.3g} {unit}) from the one given; band {bands.voltage_percent:g} %",
     )
 

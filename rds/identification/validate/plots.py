@@ -11,6 +11,7 @@ import numpy as np
 from rds.core.figure import BLUE, CYCLE, GREEN, GREY, RESPONSES, VERMILLION, Picture, dress, legend, quantity
 from rds.identification.fit.needed_voltage import static_curve
 from rds.identification.fit.residuals import Correlation
+from rds.identification.logs.units import acting
 from rds.identification.validate.assessment import Assessment
 from rds.identification.validate.candidate import Candidate
 from rds.results.units import heading
@@ -88,7 +89,8 @@ def friction_curve(candidate: Candidate, a: Assessment) -> Picture:
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     legend(axes)
     speed = a.ranges["velocity"]
-    dress(axes, heading("voltage", a.ranges["command"].unit), heading("velocity", speed.unit))
+    unit = a.ranges["command"].unit
+    dress(axes, heading(acting(unit), unit), heading("velocity", speed.unit))
     return picture
 
 

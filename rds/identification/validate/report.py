@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rds.core.atomic import write_files
+from rds.identification.logs.units import acting
 from rds.identification.validate.criterion import known
 from rds.identification.validate.verdict import Verdict, Word
 from rds.results.html import image, notes_list, table
@@ -135,8 +136,8 @@ def _rest(a: Assessment) -> str:
     if a.voltage is not None:
         unit = a.ranges["command"].unit
         rows += [
-            ["voltage error [%]", a.voltage.relative_percent],
-            [heading("voltage error, RMS", unit), a.voltage.rmse],
+            [f"{acting(unit)} error [%]", a.voltage.relative_percent],
+            [heading(f"{acting(unit)} error, RMS", unit), a.voltage.rmse],
             ["blocks for it, and left out", f"{len(a.voltage.extra)}, {a.voltage.left_out}"],
         ]
     if a.drift is not None:

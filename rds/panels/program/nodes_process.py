@@ -1,8 +1,8 @@
 """A part program on the nodes of a machine, in a process of its own: `python -m rds.panels.program.nodes_process`.
 
-What is to be done (`NodesRequest`) comes pickled on stdin; on stdout go pickled words: (BEGINS, what, share, s or None) now
-and then, (NOTE, what is not carried out), and (DONE, how it was) or (FAILED, why) at the end. When stdin ends, somebody
-wants it to stop, or whoever gave the order has died: the nodes are told to stop, and nothing more is said.
+What is to be done (`NodesRequest`) comes pickled on stdin; on stdout go pickled words: (BEGINS, what, share, s or None)
+now and then, (NOTE, what is not carried out), and (DONE, how it was) or (FAILED, why) at the end. When stdin ends,
+somebody wants it to stop, or whoever gave the order has died: the nodes are told to stop, and nothing more is said.
 """
 
 from __future__ import annotations
