@@ -1,4 +1,4 @@
-"""A run whose axis was beyond its travel says so: an unstable law is the commonest mistake of a first week."""
+"""A run whose axis was beyond its travel, or whose voltage was at its limit, says so: mistakes of a first week."""
 
 from __future__ import annotations
 
@@ -48,3 +48,15 @@ def test_a_model_of_ones_own_that_is_unstable_is_told(tmp_path: Path, sign: str,
     told = [note for note in result.meta["notes"] if "beyond its range of -10000 to 10000 rev/min" in note]
     assert bool(told) is is_told
     assert all(note.endswith("look at the signal, and at whether your model is stable (`rds check`)") for note in told)
+
+
+@pytest.mark.parametrize(("gain", "is_told"), [(30000.0, True), (200.0, False), (20.0, False)])
+def test_a_voltage_that_is_at_its_limit_for_long_is_told(tmp_path: Path, gain: float, is_told: bool) -> None:
+    (tmp_path / "law.py").write_text(LAW.format(error="r.position - y"))
+    reference = {"kind": "sinusoid", "amplitude": 2.0, "frequency": 1.0}
+    own = {"file": str(tmp_path / "law.py"), "params": {"Kp": gain}}
+    result = Experiment(controller=own, reference=reference, duration=1.0).run()
+    share = 100.0 * float((abs(result["X_voltage"]) > 9.99).mean())
+    said = f"X: the converter limited the voltage to ±10 V in {share:.0f} % of the samples"
+    assert any(note.startswith(said) for note in result.meta["notes"]) is is_told
+    assert (share >= 20.0) is is_told

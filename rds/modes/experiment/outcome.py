@@ -18,7 +18,9 @@ import numpy as np
 from rds.core.installed import version as own_version
 from rds.core.types import Ending, Model, Source
 from rds.core.values import shown
+from rds.machines.converter import limits
 from rds.modes import SIMULATION, load_mode
+from rds.modes.loop.commands import Command
 from rds.modes.loop.plan import Plan
 from rds.modes.loop.program import InterpolatedProgram
 from rds.modes.loop.stopwatch import TIMING_COLUMNS
@@ -31,6 +33,7 @@ from rds.modes.process.timing import Timing, judge, summary
 from rds.results import Result
 
 _CLOSE = 0.006  # mm: as `rds check` has it
+_OFTEN = 20.0  # % of the samples: from here on a voltage at its limit is told
 _LONGEST = 1024  # bits of an int that is kept as a number: beyond some thousand digits Python does not print it
 
 
@@ -51,7 +54,7 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     meta["notes"] += (
         _short_of_its_end(plan, rows, columns)
         + _of_another_period(plan)
-        + _beyond_travel(plan, columns)
+        + (_beyond_travel(plan, columns) or _at_the_limit(plan, columns))
         + _concluded(plan, columns)
     )
     if mode.real_time:
@@ -110,6 +113,25 @@ def _beyond_travel(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
             f"{axis.name} was at {there}, beyond its {'range' if turns else 'travel'} of {low:g} to {high:g} "
             f"{axis.unit}; look at {cause}"
         )
+    return said
+
+
+def _at_the_limit(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
+    """A sentence for each law whose voltage the converter limited for a good part of the run: nothing else tells it."""
+    board, said = plan.machine.converter, []
+    low, high, _ = limits(board.range, board.bits, quantization=plan.quantization)
+    for part in plan.axes:
+        voltage = columns.get(part.acting, np.empty(0))
+        if not plan.saturation or part.signal is not None or part.command is not Command.VOLTAGE or not len(voltage):
+            continue
+        if part.controller is not None and part.controller.conclude is not None:
+            continue  # a relay switches between limits, and says itself what came of it
+        share = 100.0 * float(np.mean((voltage <= low) | (voltage >= high)))
+        if share >= _OFTEN:
+            said.append(
+                f"{part.axis.name}: the converter limited the voltage to ±{board.range:g} V in {share:.0f} % of the "
+                "samples, where the law has no effect; lower its gains, or ask for a slower or smaller motion"
+            )
     return said
 
 
