@@ -159,8 +159,10 @@ def _show_self(found: SelfCheck) -> None:
         many = "criterion is" if found.left_out == 1 else "criteria are"
         note += f" {found.left_out} more {many} not tried here, worth {found.left_out_points:g} points."
     show_table("Self-check", ["criterion", "result", "value", "margin", "worth"], rows, note)
+    cause = found.reason.partition(": ")[2] if found.reason.startswith("case ") else found.reason
     for line in found.lines:
-        if line.sentence and line.word != "pass" and line.sentence.rstrip(".") != found.reason.rstrip("."):
+        is_told = bool(cause) and cause.rstrip(".") in line.sentence  # at the top, and the same for each criterion
+        if line.sentence and line.word != "pass" and not is_told:
             typer.echo(f"- {line.title}: {line.sentence}")
 
 

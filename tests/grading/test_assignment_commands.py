@@ -98,6 +98,13 @@ def test_going_without_the_sandbox_is_said_loudly(tmp_path: Path) -> None:
     assert "WARNING: --trust-my-file: your file runs WITHOUT the sandbox" in ran.stderr
 
 
+def test_a_fault_that_every_criterion_has_is_told_once(tmp_path: Path) -> None:
+    folder = assignment_in(tmp_path, HEAD + SINE + RMS + RMS.replace('"rms"', '"again"'))
+    (tmp_path / "broken.py").write_text("def control(t, r, y, state, params):\n    return foo, state\n")
+    ran = rds("self", folder, tmp_path / "broken.py", "--trust-my-file")
+    assert ran.exit_code == 1 and ran.stdout.count("name 'foo' is not defined") == 1
+
+
 def test_where_the_sandbox_is_missing_nothing_runs_in_silence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rds.grading.sandbox.requirements.available", lambda: "bubblewrap is missing; apt install it")
     folder = assignment_in(tmp_path, HEAD + SINE + RMS)
