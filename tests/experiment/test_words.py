@@ -239,7 +239,7 @@ def refused(folder: Path, file: str, line: int | None, said: str) -> None:
 def test_files_that_cannot_be_read(alone: Path) -> None:
     with pytest.raises(rds.InputError, match=r"gone.toml: cannot be read: .*check the path"):
         rds.Experiment.from_toml(alone / "gone.toml")
-    with pytest.raises(rds.InputError, match="cannot be read"):
+    with pytest.raises(rds.InputError, match="it is a folder; name the TOML file"):
         rds.Experiment.from_toml(alone)
     (alone / "latin.toml").write_bytes(b'title = "\xe4"\n')
     with pytest.raises(rds.InputError, match="is not UTF-8 text"):
