@@ -115,9 +115,7 @@ def load_student(path: str | Path, validate: bool = True, limit: bool = True) ->
     file = file.resolve()
     text = _decode(data, file)
     if text.lstrip().startswith("{") and all(word in text for word in ('"cells"', '"nbformat"')):
-        raise InputError(
-            "it is a notebook with the ending .py; hand it in as .ipynb, or save its code as .py", str(file)
-        )
+        raise InputError("it is a notebook with the ending .py; name it .ipynb, or save its code as .py", str(file))
     source = Source(file.name, str(file), hashlib.sha256(data).hexdigest(), text)
     with limited() if limit else nullcontext():
         variables = run_text(text, file)

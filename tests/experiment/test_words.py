@@ -258,7 +258,7 @@ def test_files_that_cannot_be_read(alone: Path) -> None:
         ("get_ipython()\n", r"law.py:1: .*a notebook that was saved as Python has such lines: remove them"),
         (
             '{"cells": [], "nbformat": 4, "x": null}\n',
-            "law.py: it is a notebook with the ending .py; hand it in as .ipynb",
+            "law.py: it is a notebook with the ending .py; name it .ipynb",
         ),
         ("raise PermissionError\n", r"law.py:1: .*where files are graded there is no network, which asyncio.run\(\)"),
         ("params = {'a': 1}\ndef control(t, r, y, state, params):\n    return 0.0, ()\n", "unknown parameter 'gain'"),
