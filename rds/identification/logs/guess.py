@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,64 +12,10 @@ import numpy as np
 from rds.core.toml_text import toml_text
 from rds.identification.logs.map import SUFFIX, LogMap, TimeMap
 from rds.identification.logs.map_axis import DIMENSIONS, UNKNOWN, AxisMap, ColumnMap
+from rds.identification.logs.name_words import drives_nothing, is_never_measured, is_no_place, role, words_of
 from rds.identification.logs.table import Column, Table, remedy
 from rds.identification.logs.units import dimension, factor, known_units
 
-
-def _words(text: str) -> frozenset[str]:
-    return frozenset(text.split())
-
-
-_DRIVING = frozenset(("torque", "force", "effort", "drehmoment", "kraft"))
-_VOLTAGES = _words("voltage volt volts spannung motorspannung ankerspannung voltaje voltagem tensao tensione")
-_CURRENTS = _words("current amps strom iststrom motorstrom ankerstrom i amperage corrente corriente courant")
-_ACTS = _DRIVING | _VOLTAGES | {"current", "strom", "motorstrom", "ankerstrom"}
-# words of names, lower case, that tell a quantity; the first that fits
-_WORDS: Mapping[str, frozenset[str]] = {
-    "time": _words("time t zeit timestamp timestamps elapsed seconds zeitstempel tempo tiempo"),
-    "reference": _words(
-        "reference ref setpoint set desired target commanded soll demand qg sollposition lagesollwert solldrehzahl "
-        "sollgeschwindigkeit drehzahlsollwert referencia consigna consigne riferimento"
-    ),
-    "velocity": _words(
-        "velocity velo vel speed v rate geschwindigkeit drehzahl istdrehzahl istgeschwindigkeit drehzahlistwert "
-        "velocidade velocidad vitesse velocita"
-    ),
-    "current": _CURRENTS,
-    "command": frozenset(("command", "cmd", "u", "input", "control", "vir")).union(_DRIVING, _VOLTAGES),
-    "position": _words(
-        "measured position pos encoder enc y x q qm ist output angle counts feedback actual act istposition "
-        "lageistwert lage weg istweg posicao posicion posizione salida"
-    ),
-}
-# never what was measured
-_OTHERS = _words(
-    "modelled simulated model error err acceleration accel acc difference diff deviation lag temperature temp "
-    "fehler abweichung regelabweichung schleppfehler schleppabstand temperatur"
-)
-# what drives nothing: supplies, and where no command is named, what sensors answer and what acts from outside
-_SUPPLIES = _words(
-    "supply bus battery batt vbus vbat dclink sensor zwischenkreisspannung versorgungsspannung batterie "
-    "vdc udc zk uzk rail mains netzspannung"
-)
-_SUPPLY_PAIRS = ({"dc", "link"},)
-_NO_DRIVES = _words(
-    "tacho tachometer tachogenerator potentiometer poti encoder resolver lvdt strain loadcell cell ain "
-    "friction disturbance external load brake braking reaction contact cutting process "
-    "reibung reibmoment lastmoment stoermoment bremsmoment"
-)
-_NO_DRIVE_PAIRS = ({"analog", "input"},)
-_COMMANDS = _words(
-    "command cmd commanded setpoint demand stellgroße stellgroesse stellsignal sollspannung sollstrom sollmoment "
-    "sollkraft motorspannung ankerspannung"
-)
-# bounds, and lengths and angles that are no position; but what is corrected by them, or comes behind them, is one
-_BOUNDS = _words("limit limits limitation grenze maximum minimum max min")
-_NO_PLACES = _words(
-    "offset compensation correction tolerance thickness diameter backlash electrical commutation phase "
-    "limit limits limitation max min"
-)
-_BEHIND = _words("after with without corrected compensated nach mit ohne korrigiert kompensiert")
 _ACTING = (("voltage",), ("force", "torque"), ("current",))
 _RISING = 0.9  # of the steps of a time go up
 _NO_LOG = "it is no log over time"
@@ -130,8 +75,8 @@ def draft(table: Table) -> str:
     content: dict[str, object] = {}
     notes = [f"What the columns of {table.path.name} mean. Check every line: it is a draft, not knowledge."]
     columns = [c for c in table.columns.values() if c.text is None]
-    named = next((c.name for c in columns if _role(c.name) == "time"), None)
-    if named is None and not any(c.unit or _role(c.name) for c in columns):
+    named = next((c.name for c in columns if role(c.name) == "time"), None)
+    if named is None and not any(c.unit or role(c.name) for c in columns):
         named = next((c.name for c in columns if _rises(c.values)), None)
     elif named is None and len(offered := _perhaps_times(columns)) == 1:
         named = offered[0]  # as dSPACE's X
@@ -198,18 +143,18 @@ def _time(table: Table) -> tuple[str | None, str]:
     columns = [c for c in table.columns.values() if c.text is None]
     in_time = [c for c in columns if dimension(c.unit or "") == "time"]
     rising = [c for c in in_time if _rises(c.values)]
-    named = [c for c in rising if _role(c.name) == "time"]
+    named = [c for c in rising if role(c.name) == "time"]
     for found in (rising, named):
         if found and all(_are_alike(c, found[0]) for c in found):
             return found[0].name, ""  # one alone, or the same in several columns
     if rising:
         return None, f"{', '.join(c.name for c in rising)} could each be the time; say which in a map"
-    named = [c for c in columns if _role(c.name) == "time"]
+    named = [c for c in columns if role(c.name) == "time"]
     if named and not in_time:
         if named[0].unit is not None:
             return None, f"{named[0].name!r} may be the time, but {_unknown(named[0], 'time')}"
         return None, f"{named[0].name!r} may be the time, but nothing gives its unit; give it in a map"
-    if columns and not any(c.unit or _role(c.name) for c in columns):
+    if columns and not any(c.unit or role(c.name) for c in columns):
         names = ", ".join(c.name for c in columns[:5]) + (" ..." if len(columns) > 5 else "")
         return None, f"nothing tells what {names} are, and in which units; say it in a map"
     return None, _no_series(columns, in_time)
@@ -218,7 +163,7 @@ def _time(table: Table) -> tuple[str | None, str]:
 def _spoiled(table: Table, quantity: str) -> str:
     """That the column which tells by its name and unit that it is the quantity has a word among its numbers, or ""."""
     for c in table.columns.values():
-        if c.text is not None and _role(c.name) == quantity and (c.unit is None or dimension(c.unit) is not None):
+        if c.text is not None and role(c.name) == quantity and (c.unit is None or dimension(c.unit) is not None):
             row, cell = c.text
             where = f"holds {cell!r:.60} in data row {row + 1}"
             return f"{quantity} is {c.name!r}, as it seems, and {where}; {remedy(cell)}"
@@ -255,11 +200,11 @@ def _in_turn(table: Table) -> str:
     times = [
         c
         for c in numbers
-        if (_role(c.name) == "time" and (_is_coarse(c) or _begins_anew(c))) or (bare and c.unit == "s")
+        if (role(c.name) == "time" and (_is_coarse(c) or _begins_anew(c))) or (bare and c.unit == "s")
     ]
     others = [c for c in numbers if c not in times and dimension(c.unit or "") != "time"]
     values = [c for c in others if np.isfinite(c.values).any()]
-    values.sort(key=lambda c: "value" not in _tokens(c.name.lower()))
+    values.sort(key=lambda c: "value" not in words_of(c.name.lower()))
     if name is None or not times or not values:
         return ""
     said = f"; but where {name!r} says in each row which signal it holds, give each signal a column of its own"
@@ -289,7 +234,7 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     units = {dimension(c.unit or "") for c in columns} | {"adc" for c in columns if c.name.endswith("_adc")}
     numbered = next((c.name for c in columns if c.name.lower() in _ORDINALS), None)
     sentence = f"{_NO_LOG}: "
-    called = next((c for c in in_time if _role(c.name) == "time"), None)
+    called = next((c for c in in_time if role(c.name) == "time"), None)
     if called is None and len(in_time) == 1 and _is_coarse(in_time[0]):
         called = in_time[0]  # as an oscilloscope rounds it
     if called is not None:
@@ -315,7 +260,7 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
 def _perhaps_times(columns: Sequence[Column]) -> list[str]:
     """The columns that nothing calls a time, and that go up as one does."""
     rising = [c for c in columns if c.unit is None and _rises(c.values) and c.name.lower() not in _ORDINALS]
-    return [c.name for c in rising if _role(c.name) is None or _is_even(c.values)]
+    return [c.name for c in rising if role(c.name) is None or _is_even(c.values)]
 
 
 def _are_alike(a: Column, b: Column) -> bool:
@@ -333,28 +278,13 @@ def _is_even(values: np.ndarray) -> bool:
     return len(steps) > 0 and bool(np.all(np.abs(steps - np.median(steps)) < 1e-3 * abs(np.median(steps))))
 
 
-def _tokens(name: str) -> list[str]:
-    """The words of a name without their accents: an accent is no gap between words, a Chinese character is one."""
-    plain = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
-    return [word for word in re.split(r"[\W_\u2e80-\uffff]+|(?<=[a-z])(?=[A-Z])", plain) if word]
-
-
-def _role(name: str) -> str | None:
-    words = [word.lower().rstrip("0123456789") or word for word in _tokens(name)]  # time1, u2
-    acts = bool(_ACTS & set(words))  # a target torque is what drives the axis, and not where it is to go
-    return next(
-        (r for r, known in _WORDS.items() if any(word in known for word in words) and not (acts and r == "reference")),
-        None,
-    )
-
-
 def _groups(table: Table, time: str | None) -> dict[str, list[Column]]:
     """Columns by axis: `X_measured`, `X voltage` are those of X; without such beginnings there is one axis."""
     columns = [c for c in table.columns.values() if c.name != time and c.text is None]
     groups: dict[str, list[Column]] = {}
     for column in columns:
         match = re.fullmatch(r"([A-Za-z][A-Za-z0-9]*?)[_. ](.+)", column.name)
-        if match and _role(match[2]) and (len(match[1]) <= 2 or match[1] == "spindle"):
+        if match and role(match[2]) and (len(match[1]) <= 2 or match[1] == "spindle"):
             groups.setdefault(match[1], []).append(column)
     whole = {n: cs for n, cs in groups.items() if all(_likely(cs, q) is not None for q in ("command", "position"))}
     return whole if whole else {"axis": columns}
@@ -362,7 +292,7 @@ def _groups(table: Table, time: str | None) -> dict[str, list[Column]]:
 
 def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
     """Quantities of one axis, or a sentence on what is in doubt."""
-    measured = [c for c in columns if not _OTHERS & {word.lower() for word in _tokens(c.name)}]
+    measured = [c for c in columns if not is_never_measured(c.name)]
     found: dict[str, Column] = {}
     for quantity in ("command", "position"):
         fits = _fitting(measured, quantity)
@@ -373,7 +303,7 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
             bare = [c.name for c in measured if c.unit is None]
             doubt = f"no column tells by its unit that it is the {quantity}"
             roles = (quantity, None, "velocity" if quantity == "position" else None)  # a speed will do
-            strange = [c for c in measured if _is_strange(c) and _role(c.name) in roles]
+            strange = [c for c in measured if _is_strange(c) and role(c.name) in roles]
             doubt += "".join(f"; {c.name!r}: {_unknown(c, quantity)}" for c in strange[:_TOLD])
             doubt += _passed_over(measured, quantity)
             if quantity == "command" and (parts := [c for c in measured if dimension(c.unit or "") == "ratio"]):
@@ -398,7 +328,7 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
 
 def _passed_over(columns: Sequence[Column], quantity: str) -> str:
     """What to do where a column has a unit of the quantity, and a word in its name tells that it is another."""
-    is_other = _drives_nothing if quantity == "command" else _is_no_place
+    is_other = drives_nothing if quantity == "command" else is_no_place
     others = [c.name for c in columns if dimension(c.unit or "") in DIMENSIONS[quantity] and is_other(c.name)]
     named = " or ".join(map(repr, others[:_TOLD]))
     return f"; by its name {named} is another quantity; if it is the {quantity}, say so in a map" if named else ""
@@ -428,52 +358,38 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
     dimensions = DIMENSIONS[quantity]
     fits = [c for c in columns if dimension(c.unit or "") in dimensions]
     if quantity == "command":  # a voltage where there is one, else the torque or force of a drive, else its current
-        fits = [c for c in fits if not _drives_nothing(c.name)]
+        fits = [c for c in fits if not drives_nothing(c.name)]
         fits = next((of for d in _ACTING if (of := [c for c in fits if dimension(c.unit or "") in d])), [])
     if quantity == "current":
-        fits = [c for c in fits if not _drives_nothing(c.name)]
+        fits = [c for c in fits if not drives_nothing(c.name)]
     if quantity in ("position", "velocity"):
-        fits = [c for c in fits if not _is_no_place(c.name)]
+        fits = [c for c in fits if not is_no_place(c.name)]
     if quantity == "reference":
-        return [c for c in fits if _role(c.name) in ("reference", "command")]  # a command position is one
+        return [c for c in fits if role(c.name) in ("reference", "command")]  # a command position is one
     if quantity != "command":
         others = ("reference", "command") if quantity in ("position", "velocity") else ("reference",)
-        fits = [c for c in fits if _role(c.name) not in others]
+        fits = [c for c in fits if role(c.name) not in others]
     if quantity == "position":  # a speed is a spindle's position only where it is called so, or nothing else is there
         places = [c for c in fits if dimension(c.unit or "") != "angular speed"]
         fits = places or fits
-    named = [c for c in fits if _role(c.name) == quantity]
+    named = [c for c in fits if role(c.name) == quantity]
     fits = named or fits
     if quantity == "command" and len(fits) > 1:  # what acts, where the controller's unlimited answer is there too
-        acting = [c for c in fits if "voltage" in {word.lower() for word in _tokens(c.name)}]
+        acting = [c for c in fits if "voltage" in words_of(c.name)]
         fits = acting if len(acting) == 1 else fits
     return fits
 
 
-def _drives_nothing(name: str) -> bool:
-    """Whether a voltage, current or force of this name is none that drives the axis."""
-    words = {word.lower() for word in _tokens(name)}
-    if _SUPPLIES & words or any(pair <= words for pair in _SUPPLY_PAIRS) or (_BOUNDS & words and not _BEHIND & words):
-        return True
-    return not _COMMANDS & words and bool(_NO_DRIVES & words or any(pair <= words for pair in _NO_DRIVE_PAIRS))
-
-
-def _is_no_place(name: str) -> bool:
-    """Whether a length, angle or speed of this name is not that of the axis."""
-    words = {word.lower() for word in _tokens(name)}
-    return bool(_NO_PLACES & words) and not _BEHIND & words
-
-
 def _likely(columns: Sequence[Column], quantity: str) -> Column | None:
     """The first column that may be the quantity, by unit or else by name."""
-    measured = [c for c in columns if not _OTHERS & {word.lower() for word in _tokens(c.name)}]
+    measured = [c for c in columns if not is_never_measured(c.name)]
     fits = _fitting(measured, quantity)
     named = [
         c
         for c in measured
-        if _role(c.name) == quantity
+        if role(c.name) == quantity
         and (c.unit is None or _is_strange(c) or (quantity == "command" and dimension(c.unit) == "ratio"))
-        and not (quantity in ("command", "current") and _drives_nothing(c.name))
+        and not (quantity in ("command", "current") and drives_nothing(c.name))
     ]
-    chosen = [*fits, *named] if any(_role(c.name) == quantity for c in fits) else [*named, *fits]
+    chosen = [*fits, *named] if any(role(c.name) == quantity for c in fits) else [*named, *fits]
     return next(iter(chosen), None)
