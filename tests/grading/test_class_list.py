@@ -15,7 +15,7 @@ from rds.grading.course.class_list import ClassList, Member, read_class_list
 from rds.grading.course.groups import by_group, with_groups_of_export, without_groups_of_export
 from rds.grading.grade import Status
 from rds.grading.intake import HandedIn, Intake
-from rds.grading.review.class_grades import everyone
+from rds.grading.review.class_grades import class_grades
 from rds.grading.review.entries import Review
 from tests.grading.grades import grade
 
@@ -176,7 +176,7 @@ def test_each_member_of_a_group_of_gradescope_gets_its_grade() -> None:
         again = with_groups_of_export(later, with_groups)
         assert again == (intake, with_groups)
     measured = grade("submission_7", details={"source": rows["submission_7"].source})
-    found = everyone([measured], with_groups, Review(), LateRules())
+    found = class_grades([measured], with_groups, Review(), LateRules())
     assert {name: (each.score, each.details["source"].get("sid")) for name, (each, _) in found.items()} == {
         "1": (26.0, "1"),
         "b": (26.0, None),

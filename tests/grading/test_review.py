@@ -22,7 +22,7 @@ from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Band, Grade, Status
 from rds.grading.review.applied import of_review, reviewed
 from rds.grading.review.best import best
-from rds.grading.review.class_grades import everyone
+from rds.grading.review.class_grades import class_grades
 from rds.grading.review.entries import FILE, Entry, Kind, Review, add, read_review
 from rds.grading.review.new_entries import marks_table, read_marks, say
 from rds.grading.review.regrade import _kept, changes_of
@@ -260,7 +260,7 @@ def test_what_was_no_student_s_fault_is_none_when_it_is_graded_again(tmp_path: P
 def test_everyone_is_found_by_what_the_export_says() -> None:
     own = grade("Ada Lovelace_501", details={"source": {"name": "Ada Lovelace", "id": "501"}}, late_days=1.5)
     own = replace(own, details={**own.details, "late_share": 0.2}, score=20.8)
-    found = everyone(
+    found = class_grades(
         [own], ClassList((Member("ada", "Ada Lovelace", section="A", extension_days=1.0),)), Review(), LATE
     )
     (counting, measured) = found["Ada Lovelace_501"]

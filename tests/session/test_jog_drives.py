@@ -26,7 +26,7 @@ from rds.cli.main import app
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 from rds.panels.jog.jog_commands import SPINDLE_DEAD_MAN
-from rds.panels.jog.module_control import VoltageHand
+from rds.panels.jog.module_control import VoltageControl
 from rds.panels.jog.state import Jog
 from rds.panels.session import Session
 
@@ -212,7 +212,7 @@ def test_what_modules_that_take_voltages_cannot_move_is_left_out_with_its_reason
     rotary = '[axis.C]\nnode = 9\nunit = "deg"\ntravel = [-90.0, 90.0]\nresolution = 0.01\n'
     fifth = re.sub(r"\[axis\.Y\.model\][^\[]*", "", text).replace("[axis.spindle]", rotary + "[axis.spindle]")
     (alone / "five.toml").write_text(fifth)
-    hand = VoltageHand(load_machine(str(alone / "five.toml")), "rds", {"interface": "virtual", "channel": "five"})
+    hand = VoltageControl(load_machine(str(alone / "five.toml")), "rds", {"interface": "virtual", "channel": "five"})
     try:
         assert list(hand.axes) == ["X", "Z"] and not hand.spindles
         assert "no model with tau and K" in hand.left_out["Y"] and "no model with tau and K" in hand.left_out["C"]
@@ -223,7 +223,7 @@ def test_what_modules_that_take_voltages_cannot_move_is_left_out_with_its_reason
 
 def test_an_axis_that_goes_astray_is_let_go(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One with a wrong sign ran to its end at full voltage, held or not; one that was blocked was pushed for ever."""
-    hand = VoltageHand(load_machine("mini-cnc"), "rds", {"interface": "virtual", "channel": "astray"})
+    hand = VoltageControl(load_machine("mini-cnc"), "rds", {"interface": "virtual", "channel": "astray"})
     try:
         monkeypatch.setattr(hand._drivers, "write", lambda volts: None)
         rest = dict.fromkeys(hand.axes, 0.0)

@@ -16,7 +16,7 @@ from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.course.class_list import ClassList, read_class_list
 from rds.grading.grade import LISTED, Grade, Status
 from rds.grading.intake.names import safe_id
-from rds.grading.review.class_grades import everyone
+from rds.grading.review.class_grades import class_grades
 from rds.grading.review.entries import Review, read_review
 
 STUDENTS, GRADE, FEEDBACK = "students", "grade.json", "feedback.html"
@@ -116,7 +116,7 @@ def read_finished(folder: str | Path) -> Finished:
         raise InputError("holds no grade yet; run `rds grade run` first", str(folder))
     listed = read_class_list(folder / CLASS) if (folder / CLASS).exists() else ClassList()
     review = read_review(folder)
-    counting = everyone((grade for grade, _ in found.values()), listed, review, late_rules(record))
+    counting = class_grades((grade for grade, _ in found.values()), listed, review, late_rules(record))
     return Finished(
         folder,
         str(record.get("title") or folder.name),

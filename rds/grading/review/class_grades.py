@@ -15,7 +15,7 @@ from rds.grading.review.entries import Review
 GROUP, SECTION = "group", "section"  # of a grade's details
 
 
-def everyone(
+def class_grades(
     grades: Iterable[Grade], listed: ClassList, review: Review, late: LateRules
 ) -> dict[str, tuple[Grade, Grade]]:
     """By student the grade that counts, and that of the batch which it is made from: of a group each member's."""

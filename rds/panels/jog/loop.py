@@ -33,7 +33,7 @@ from rds.core.scheduling import raise_priority
 from rds.interpolators.motion.jog import advance
 from rds.machines import load_machine
 from rds.panels.jog.jog_commands import JogCommands, Wanted
-from rds.panels.jog.module_control import Hand, open_hand
+from rds.panels.jog.module_control import ModuleControl, open_hand
 
 REPORTS = 20.0  # 1/s
 _PRIORITY = 50  # of SCHED_FIFO, below that of hub and simulated modules
@@ -46,7 +46,7 @@ class HomingCancelled(Exception):
 class Reference:
     """Where each axis shall be and how fast, and how fast each spindle shall turn."""
 
-    def __init__(self, hand: Hand, measured: Mapping[str, float]):
+    def __init__(self, hand: ModuleControl, measured: Mapping[str, float]):
         self.places = {name: measured[name] for name in hand.axes}
         self.speeds = dict.fromkeys((*hand.axes, *hand.spindles), 0.0)
 
@@ -55,7 +55,9 @@ class Reference:
         """Whether nothing shall move."""
         return not any(self.speeds.values())
 
-    def advance(self, hand: Hand, orders: JogCommands, wanted: Wanted | None, turning: Mapping[str, float]) -> None:
+    def advance(
+        self, hand: ModuleControl, orders: JogCommands, wanted: Wanted | None, turning: Mapping[str, float]
+    ) -> None:
         """Move on by a period: one axis towards its goal, the others to rest, spindles towards their speeds."""
         for name, axis in hand.axes.items():
             goal, speed = wanted[1:] if wanted is not None and wanted[0] == name else (None, axis.speed)
@@ -69,7 +71,7 @@ class Reference:
             self.speeds[name] += min(max(turning[name] - self.speeds[name], -most), most)
 
 
-def jog(hand: Hand, orders: JogCommands) -> None:
+def jog(hand: ModuleControl, orders: JogCommands) -> None:
     """Hold all axes where they are, and move what is wanted, until `orders.ended`. MachineError where the bus fails."""
     hand.start()
     reference = _introduce(hand, orders)
@@ -99,7 +101,7 @@ def jog(hand: Hand, orders: JogCommands) -> None:
             due -= left  # what is late is not made up for
 
 
-def _home(hand: Hand, orders: JogCommands) -> list[str]:
+def _home(hand: ModuleControl, orders: JogCommands) -> list[str]:
     """Let drives find home, as long as that is wanted; the axes that did."""
     methods = orders.homing
     places = dict(orders.places)
@@ -121,7 +123,7 @@ def _home(hand: Hand, orders: JogCommands) -> list[str]:
     return []
 
 
-def _introduce(hand: Hand, orders: JogCommands) -> Reference:
+def _introduce(hand: ModuleControl, orders: JogCommands) -> Reference:
     """After a start: where the axes stand and are held, and their travel, which may be another one."""
     measured = hand.read()
     reference = Reference(hand, measured)

@@ -22,7 +22,7 @@ _ASTRAY = 0.2  # s; longer than a module may be silent
 _FROM_SWITCHES = 1e-3  # of the travel, which is left between an axis and its limit switch: to touch one is a fault
 
 
-class Hand(Protocol):
+class ModuleControl(Protocol):
     """Called in turn by the loop, `period` s apart: read(), write()."""
 
     period: float
@@ -46,9 +46,9 @@ class Hand(Protocol):
         """Let the modules go: no voltage."""
 
 
-def open_hand(dialect: str, machine: Machine, bus: Mapping[str, Any]) -> Hand:
+def open_hand(dialect: str, machine: Machine, bus: Mapping[str, Any]) -> ModuleControl:
     """The hand for modules of this dialect; `bus` holds what a `[bus]` table does."""
-    return DriveHand(machine, bus) if dialect == "cia402" else VoltageHand(machine, dialect, bus)
+    return DriveControl(machine, bus) if dialect == "cia402" else VoltageControl(machine, dialect, bus)
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class SpindleLaw:
         return float(volts)
 
 
-class VoltageHand:
+class VoltageControl:
     """Modules that take voltages (rds, oacs, dcs): a loop for each axis and spindle whose model has tau and K."""
 
     period = 0.002  # s; on a serial line, which carries no more, the machine's sample period
@@ -157,7 +157,7 @@ class VoltageHand:
         self._drivers.close()
 
 
-def _leave_out(hand: Hand, answering: set[str]) -> None:
+def _leave_out(hand: ModuleControl, answering: set[str]) -> None:
     """A machine may be used without its spindle's module; without an axis's, it is not whole, which start() says."""
     for name in [name for name in hand.spindles if name not in answering]:
         del hand.spindles[name]
@@ -181,7 +181,7 @@ def _axis_law(axis: Axis, voltage: float, period: float) -> AxisLaw:
     return AxisLaw(tau, axis.model["K"], friction, voltage, axis.resolution)
 
 
-class DriveHand:
+class DriveControl:
     """CiA 402 drives: axes follow positions (csp), spindles speeds (csv), and the loops are in the drives.
 
     Positions are the drives' own. A `[bus.cia402]` table among `bus` says how to reach the drives; which modes it

@@ -29,7 +29,7 @@ class FirstVisit(anywidget.AnyWidget):
     unit = traitlets.Unicode("").tag(sync=True)
 
     def __init__(self, session: Session, ticker: Any):
-        super().__init__(_esm=static(__file__, "alive.js"))
+        super().__init__(_esm=static(__file__, "first_visit.js"))
         self._session, self._ticker = session, ticker
         self._rows: np.ndarray | None = None
         self._task: Task[tuple[str, str, np.ndarray]] | None = None

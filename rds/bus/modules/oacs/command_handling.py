@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rds.bus.modules.oacs.module import OacsModule
 
 
-def obey(module: OacsModule, fields: Mapping[str, Any], at: float) -> None:
+def carry_out_command(module: OacsModule, fields: Mapping[str, Any], at: float) -> None:
     """Carry out, or refuse, the command with these fields, which arrived at the instant `at`, s."""
     code = fields["Code"]
     if code == Code.DATA_CALL:

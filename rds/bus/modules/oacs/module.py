@@ -18,7 +18,7 @@ from typing import NamedTuple
 from rds.bus.modules.oacs import codes as words
 from rds.bus.modules.oacs import messages
 from rds.bus.modules.oacs.codes import Acknowledges, Code, MessageToHost, Mode, Parameter, Result
-from rds.bus.modules.oacs.command_handling import obey
+from rds.bus.modules.oacs.command_handling import carry_out_command
 from rds.bus.modules.oacs.iso_tp import Sender
 from rds.bus.modules.oacs.messages import Frame
 from rds.bus.modules.oacs.module_data import ModuleData
@@ -129,7 +129,7 @@ class OacsModule:
                 if identifier == words.GENERAL:
                     self._general_call(message.fields["Code"], at)
                 else:
-                    obey(self, message.fields, at)
+                    carry_out_command(self, message.fields, at)
         except MachineError as error:
             LOG.warning("module %s ignored a frame: %s", self.name, error)
             if identifier == words.COMMAND + self.node:
