@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 import subprocess
 import sys
 
@@ -138,6 +139,10 @@ def test_the_surface_of_a_result(result: Result) -> None:
     assert "X_measured" in result and "Y_measured" not in result
     with pytest.raises(KeyError, match="no column 'Y_measured'; the columns are time, X_reference"):
         result["Y_measured"]
+    with pytest.raises(KeyError, match="no axis 'Y'; this result has X"):
+        result.metrics["Y"]
+    with pytest.raises(KeyError, match=r"no metric 'rms'; this result has mean_error, .*rms_error, fit_percent"):
+        pickle.loads(pickle.dumps(result.metrics))["X"]["rms"]
     with pytest.raises(ValueError, match="read-only"):
         result["time"][0] = 1.0
     assert list(result.table.columns) == list(result)
