@@ -8,7 +8,7 @@ from rds.nc.language.canon import RATE
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import only_rotary
 from rds.nc.passed_over import Report
-from rds.nc.path_block import DefaultFeed
+from rds.nc.path_block import BY_PITCH, DefaultFeed
 
 
 class FeedRates:
@@ -32,7 +32,7 @@ class FeedRates:
         self._line = 0
 
     def of(self, rows: np.ndarray, unit: float, speed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of each row: mm/s, degrees/s for moves of rotary axes alone, and the line of its word F.
+        """Of each row: mm/s, degrees/s for moves of rotary axes alone, and the line of its word F (or BY_PITCH).
 
         unit: mm of a program unit. speed: of the spindle, turns per minute.
         """
@@ -44,6 +44,7 @@ class FeedRates:
         self._rate, self._line = (float(plain[-1]), float(linear[-1])), int(lines[-1])
         if self.pitch:
             plain, linear = np.full(len(rows), self.pitch), np.full(len(rows), self.pitch * unit)
+            lines = np.full(len(rows), BY_PITCH, np.int32)
         scale = (speed if self.by_speed else 1.0) / 60.0
         return linear * scale, plain * scale, lines
 

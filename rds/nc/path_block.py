@@ -23,6 +23,9 @@ class Event(NamedTuple):
     line: int
 
 
+BY_PITCH = -1  # in place of the line of a word F: the pitch and the spindle's speed give the feed
+
+
 class DefaultFeed(NamedTuple):
     """What a machine moves at by feed where no word F says more (option default-feed of the dialect)."""
 
@@ -35,7 +38,8 @@ class DefaultFeed(NamedTuple):
 class PathBlock:
     """Segments (dtype SEGMENT) in machine coordinates, and the events among them, all of one file and one tool.
 
-    `feed_lines` gives for each segment the line whose word F it obeys (0: one in another file).
+    `feed_lines` gives for each segment the line whose word F it obeys (0: one in another file;
+    BY_PITCH: none, in a thread or a tap).
     """
 
     segments: np.ndarray

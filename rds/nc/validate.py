@@ -20,7 +20,7 @@ from rds.nc.extent import extents
 from rds.nc.fault_columns import located_at_words
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import only_rotary
-from rds.nc.path_block import DefaultFeed
+from rds.nc.path_block import BY_PITCH, DefaultFeed
 from rds.nc.tool_centre import slowed
 from rds.nc.validation import UNITS_OF_AXES, Validation, plain
 
@@ -33,6 +33,7 @@ LONG_DWELL, LONGEST_DWELL = 60.0, 3600.0  # s; chosen: more may be, and is, a P 
 MOST_FAULTS = 1000  # are kept; others are counted
 MOST_WARNINGS = 100  # are kept
 RUNAWAY = 1000  # times that a line has left the travel, each time farther out: its loop is not followed further
+_FEED_WORDS = "F G1 G2 G3 G33 G76 G84"
 _FASTER = 1.0 + 1e-9  # a feed is too fast by more than rounding
 LINEAR, ROTARY = slice(0, 3), slice(3, 6)  # of the axes
 _MAX = re.compile(r"\bmax((?:\s+[SF]\s*\d+(?:\.\d*)?)+)", re.IGNORECASE)
@@ -268,13 +269,19 @@ class Validator:
         given = block.feed_lines[too_fast]
         at_line = np.where(given > 0, given, block.segments["line"][too_fast])
         for line in np.unique(at_line):
-            fastest = float(rate[too_fast[at_line == line]].max())
-            said = f"a feed of {plain(fastest * 60)} {unit} is more than {who} ({plain(limit * 60)})"
-            if self._machine.limit_feed and kind != "tool":
+            here = at_line == line
+            fastest = float(rate[too_fast[here]].max())
+            feed, remedy = f"a feed of {plain(fastest * 60)} {unit} is", "lower it"
+            if by_pitch := bool(np.any(given[here] == BY_PITCH)):
+                feed, remedy = f"the pitch times the speed of the spindle is {plain(fastest * 60)} {unit},", "lower S"
+            said = f"{feed} more than {who} ({plain(limit * 60)})"
+            if (
+                self._machine.limit_feed and kind != "tool" and not by_pitch
+            ):  # slower, a thread would have another pitch
                 found = ProgramError(f"{said}, and is limited to it", file=block.file or self._name, line=int(line))
-                self.warn(found, "F G1 G2 G3")
+                self.warn(found, _FEED_WORDS)
             else:
-                self._fault(block, line, f"{said}; lower it", f"feed {kind} {unit}", fastest / limit, "F G1 G2 G3")
+                self._fault(block, line, f"{said}; {remedy}", f"feed {kind} {unit}", fastest / limit, _FEED_WORDS)
 
     def _look_at_output(self, event: Event, block: PathBlock) -> None:
         kind, number, _ = str(event.value).split()

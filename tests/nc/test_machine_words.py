@@ -97,6 +97,12 @@ def test_a_feed_above_an_axis_is_limited_with_a_note_where_the_machine_says_so(t
     assert speed == pytest.approx(limits.velocity, rel=0.002)
 
 
+def test_a_thread_is_never_limited_to_a_feed_of_another_pitch(tmp_path: Path) -> None:
+    part = program(tmp_path, "G21 F60\nM3 S1000\nG0 Z1\nG33 Z-10 K1\nM5\nM2\n")
+    result, _ = check_program(part, machine_with(tmp_path, "limit_feed = true"), Setup())
+    assert [(fault.line, "lower S" in fault.reason) for fault in result.faults] == [(4, True)]
+
+
 def test_a_thread_is_cut_on_the_lathe_by_the_turns_of_its_spindle(tmp_path: Path) -> None:
     part = program(
         tmp_path,
