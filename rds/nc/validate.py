@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rds.core.shared_quantities import TIED_FEED
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.segments import AXES, JOINTS, MOVED
 from rds.machines import Machine
@@ -62,6 +63,8 @@ class Validator:
 
     def __init__(self, machine: Machine, tools: Iterable[Tool] = (), name: str = ""):
         self._machine, self._name = machine, name
+        self._follows_spindle = False  # after the blocks so far
+        self._follow = np.zeros(0, bool)  # of the block being looked at
         self._slowed = False  # a move for the tip is slowed down by a joint
         self._tools = {tool.number: tool_limits(tool.comment) for tool in tools}
         limits = Limits.of(machine)
@@ -136,6 +139,7 @@ class Validator:
         """Check one block. Raises ProgramError for a loop that runs out of the travel without an end in sight."""
         self._files.setdefault(block.file, len(self._files))
         limits = self._tools.get(block.tool, ToolLimits())
+        self._follow = self._follow_spindle(block)
         for event in block.events:
             if event.kind == "spindle":
                 self._look_at_spindle(event, block, limits)
@@ -255,6 +259,15 @@ class Validator:
         )
         self.warn(ProgramError(message, file=block.file or self._name, line=line), "F G1 G2 G3")
 
+    def _follow_spindle(self, block: PathBlock) -> np.ndarray:
+        """Which segments are threads and taps: slower than they say, they would have another pitch."""
+        follow = np.full(len(block), self._follows_spindle)
+        for event in block.events:
+            if event.kind == "override":
+                self._follows_spindle = event.value == TIED_FEED
+                follow[event.after + 1 :] = self._follows_spindle
+        return follow
+
     def _too_fast(self, block: PathBlock, some: np.ndarray, limit: float, who: str, kind: str) -> None:
         """`limit` in mm/s or degrees/s. The fault is on the line of the word F, for all moves that obey it.
 
@@ -272,12 +285,10 @@ class Validator:
             here = at_line == line
             fastest = float(rate[too_fast[here]].max())
             feed, remedy = f"a feed of {plain(fastest * 60)} {unit} is", "lower it"
-            if by_pitch := bool(np.any(given[here] == BY_PITCH)):
+            if np.any(given[here] == BY_PITCH):
                 feed, remedy = f"the pitch times the speed of the spindle is {plain(fastest * 60)} {unit},", "lower S"
             said = f"{feed} more than {who} ({plain(limit * 60)})"
-            if (
-                self._machine.limit_feed and kind != "tool" and not by_pitch
-            ):  # slower, a thread would have another pitch
+            if self._machine.limit_feed and kind != "tool" and not np.any(self._follow[too_fast[here]]):
                 found = ProgramError(f"{said}, and is limited to it", file=block.file or self._name, line=int(line))
                 self.warn(found, _FEED_WORDS)
             else:
