@@ -400,6 +400,7 @@ def test_dspace_s_x_is_drafted_as_the_time(tmp_path: Path) -> None:
         ("time [s],Voltage [V],Position Difference [mm]", "position"),
         ("time [s],Bus Voltage [V],Position [mm]", "command"),
         ("time [s],Supply Voltage [V],Speed [rpm]", "command"),
+        ("time [s],DCBusVoltage [V],Speed [rpm]", "command"),
         ("time [s],DC-Link [V],Position [mm]", "command"),
         ("time [s],Tacho [V],Position [mm]", "command"),
         ("time [s],Analog input 1 [V],Position [mm]", "command"),

@@ -40,7 +40,7 @@ _OTHERS = _words(
 )
 # what drives nothing: supplies, and where no command is named, what sensors answer and what acts from outside
 _SUPPLIES = _words(
-    "supply bus battery batt vbus vbat dclink sensor zwischenkreisspannung versorgungsspannung batterie "
+    "supply bus dcbus busvoltage battery batt vbus vbat dclink sensor zwischenkreisspannung versorgungsspannung batterie "
     "vdc udc zk uzk rail mains netzspannung"
 )
 _SUPPLY_PAIRS = ({"dc", "link"},)
@@ -100,4 +100,4 @@ def is_no_place(name: str) -> bool:
 def _tokens(name: str) -> list[str]:
     """The words of a name without their accents: an accent is no gap between words, a Chinese character is one."""
     plain = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
-    return [word for word in re.split(r"[\W_\u2e80-\uffff]+|(?<=[a-z])(?=[A-Z])", plain) if word]
+    return [word for word in re.split(r"[\W_\u2e80-\uffff]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z]{2})(?=[A-Z][a-z])", plain) if word]
