@@ -68,6 +68,7 @@ BAD: list[tuple[Columns, str, str, str]] = [
     (changed(position=lambda p: np.round(p / 1000, 3)), "excitation", "fault", "the axis hardly moves"),
     (changed(position=np.negative), "sign", "fault", "moves against its command"),
     (swapped(), "columns", "fault", "they are swapped"),
+    (changed(voltage=np.abs), "columns", "warning", "the command has one sign: is it a magnitude?"),
     (changed(position=lambda p: p * 1000), "units", "fault", "its unit is wrong"),
     (changed(voltage=lambda u: u * 1000), "units", "fault", "the converter gives 10 V at most"),
     (
