@@ -40,8 +40,8 @@ _OTHERS = _words(
 )
 # what drives nothing: supplies, and where no command is named, what sensors answer and what acts from outside
 _SUPPLIES = _words(
-    "supply bus dcbus busvoltage battery batt vbus vbat dclink sensor zwischenkreisspannung versorgungsspannung batterie "
-    "vdc udc zk uzk rail mains netzspannung"
+    "supply bus dcbus busvoltage battery batt vbus vbat dclink sensor zwischenkreisspannung versorgungsspannung "
+    "batterie vdc udc zk uzk rail mains netzspannung"
 )
 _SUPPLY_PAIRS = ({"dc", "link"},)
 _NO_DRIVES = _words(
@@ -61,6 +61,8 @@ _NO_PLACES = _words(
     "limit limits limitation max min"
 )
 _BEHIND = _words("after with without corrected compensated nach mit ohne korrigiert kompensiert")
+
+_GAPS = re.compile(r"[\W_\u2e80-\uffff]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z]{2})(?=[A-Z][a-z])")  # motorVoltage, DCBus
 
 
 def role(name: str) -> str | None:
@@ -100,4 +102,4 @@ def is_no_place(name: str) -> bool:
 def _tokens(name: str) -> list[str]:
     """The words of a name without their accents: an accent is no gap between words, a Chinese character is one."""
     plain = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
-    return [word for word in re.split(r"[\W_\u2e80-\uffff]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z]{2})(?=[A-Z][a-z])", plain) if word]
+    return [word for word in _GAPS.split(plain) if word]

@@ -57,7 +57,7 @@ def direction(log: Log, axis: Axis | None) -> list[Finding]:
         what = f"the motion hardly follows the command (correlation {follows:.2f} at best): "
         one_sign = log.command.min() >= 0.0 or log.command.max() <= 0.0
         if one_sign and seen.speed.min() < -seen.moves and seen.speed.max() > seen.moves:
-            what += "the axis moves both ways, and the command has one sign: is it a magnitude? Take a column with signs"
+            what += "the axis moves both ways, and the command has one sign: is it a magnitude? Take one with its sign"
         else:
             what += "is the position of this axis, and of this time?"
         return [Finding("columns", what, Gravity.WARNING)]
