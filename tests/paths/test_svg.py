@@ -213,3 +213,17 @@ def test_flowed_text_of_inkscape_is_told(drawn: Read) -> None:
     flowed = f"<flowRoot><flowRegion>{BOX}</flowRegion><flowPara>Part 7</flowPara></flowRoot>"
     drawing = drawn(BOX + flowed)
     assert len(drawing.curves) == len(drawing.notes) == 1 and "1 × text (Path > Object" in drawing.notes[0]
+
+
+def test_lines_drawn_twice_are_cut_once_and_that_is_told(drawn: Read) -> None:
+    spokes = '<path d="M0 0L5 0M0 0L0 5"/><g transform="scale(2)"><path d="M2.5 0H0"/></g><line y2="5" stroke="red"/>'
+    drawing = drawn(spokes)
+    length = sum(np.hypot(*np.diff(curve.points, axis=0).T).sum() for curve in drawing.curves)
+    assert length == pytest.approx(10.0)
+    assert drawing.notes == ["passed over: 2 × curves that are drawn already, on the same layer"]
+
+
+@pytest.mark.parametrize("d", ["M0 0L5 5TZ", "M0 0L5 5 l", "M0 0 Q9 9 5 0 T z M8 8 l1 1", "M", "M0 0LL5 5"])
+def test_a_command_of_a_path_without_its_numbers_is_refused(drawn: Read, d: str) -> None:
+    with pytest.raises(InputError, match=r"path command [TlML] has no numbers"):
+        drawn(f'<path d="{d}"/>')

@@ -15,7 +15,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.limits import read_limited
-from rds.nc.shapes.curves import CHORD_ERROR, MOST_POINTS, Curve, Drawing, circle_curve, joined, polyline_curve
+from rds.nc.shapes.curves import CHORD_ERROR, MOST_POINTS, Curve, Drawing, assembled, circle_curve, polyline_curve
 from rds.nc.shapes.svg_path import polylines
 
 _LARGEST = 64 << 20  # bytes
@@ -70,8 +70,7 @@ def read_svg(path: Path) -> Drawing:
     matrix, view = _page(root, name)
     for child in root if reader.is_shown(root, True) else ():
         reader.walk(child, matrix, "", 0, view, paint=reader.paint(root, _PAINTED))
-    notes = [f"passed over: {count} × {what}" for what, count in reader.passed_over.items()]
-    return Drawing(joined(reader.curves), name, notes)
+    return assembled(reader.curves, name, reader.passed_over)
 
 
 def _page(root: ElementTree.Element, name: str) -> tuple[Matrix, View]:
