@@ -242,3 +242,56 @@ def test_a_drive_that_moves_by_profiles_gets_steps_instead_of_a_sine() -> None:
     table = tomllib.loads(experiment_text(choices, "bench.toml", {}))
     assert (table["reference"]["kind"], table["bus"]["cia402"]["mode"]) == ("square", "pp")
     assert replace(choices, mode="csp").motion == "sine"
+
+
+COMPACT = """[DeviceInfo]
+VendorNumber=1
+[1A00]
+ParameterName=TPDO mapping
+ObjectType=8
+DataType=0x0007
+AccessType=rw
+CompactSubObj=4
+[1A00Value]
+NrOfEntries=2
+1=0x60410010
+2=0x60640020
+[1016]
+ParameterName=Heartbeats
+ObjectType=8
+DataType=0x0007
+AccessType=rw
+DefaultValue=7
+CompactSubObj=3
+[1016VALUE]
+NrOfEntries=1
+2=$NODEID+0x10000
+[1016Name]
+NrOfEntries=1
+3=of the third
+[1003]
+ParameterName=Errors
+ObjectType=8
+DataType=0x0007
+AccessType=ro
+CompactSubObj=2
+[1600]
+ParameterName=RPDO mapping
+ObjectType=8
+DataType=0x0007
+AccessType=rw
+CompactSubObj=2
+"""
+
+
+def test_the_values_and_names_of_a_compact_array_are_those_of_its_sections(tmp_path: Path) -> None:
+    (tmp_path / "drive.eds").write_text(COMPACT)
+    od = read_eds(tmp_path / "drive.eds", node=5)
+    defaults = {index: [od[index][k].default for k in sorted(od[index])] for index in (0x1A00, 0x1016, 0x1003, 0x1600)}
+    assert defaults == {
+        0x1A00: [2, 0x60410010, 0x60640020, None, None],
+        0x1016: [3, 7, 0x10005, 7],
+        0x1003: [None, None, None],
+        0x1600: [None, None, None],
+    }
+    assert [od[0x1016][k].name for k in (1, 2, 3)] == ["Heartbeats", "Heartbeats", "of the third"]

@@ -128,3 +128,10 @@ def test_offsets_kept_in_a_file_are_those_of_rs274(tmp_path: Path) -> None:
         program, tools=tmp_path / "tool.tbl", parameters=tmp_path / "p.var", options=Dialect(inch_machine=True)
     )
     assert list(text(items)) == printed
+
+
+def test_the_name_of_a_file_as_a_str_is_told_from_a_program(tmp_path: Path) -> None:
+    (tmp_path / "part.ngc").write_text("M2\n")
+    with pytest.raises(ProgramError, match=r"part\.ngc: is the name of a file.*give Path"):
+        list(interpret(str(tmp_path / "part.ngc")))
+    assert list(text(interpret(tmp_path / "part.ngc"))) == list(text(interpret("M2\n")))

@@ -198,3 +198,68 @@ def test_what_is_refused_is_told_with_the_file(tmp_path: Path, entity: str, why:
 
 def test_an_arc_that_is_as_good_as_straight_is_a_line(drawn: Read) -> None:
     assert len(drawn("0 LWPOLYLINE 8 a 70 0 10 0 20 0 42 1e-18 10 10 20 0").curves[0].points) == 2
+
+
+SQUARE = (
+    "0 LINE 8 a 10 0 20 0 11 8 21 0",
+    "0 LINE 8 a 10 8 20 0 11 8 21 5",
+    "0 LINE 8 a 10 8 20 5 11 0 21 5",
+    "0 LINE 8 a 10 0 20 5 11 0 21 0",
+)
+POLYLINE = "0 LWPOLYLINE 8 a 70 1 10 8 20 5 10 8 20 0 10 0 20 0 10 0 20 5"
+LYING = "0 ELLIPSE 8 a 10 0 20 0 11 3 21 0 40 0.5 41 0 42 6.283185307179586"
+
+
+@pytest.mark.parametrize(
+    ("more", "twice"),
+    [
+        (SQUARE[:1], 1),
+        (("0 LINE 8 a 10 8 20 0 11 0 21 0", *SQUARE[1:2] * 2), 3),
+        (SQUARE, 4),
+        ((POLYLINE,), 1),
+        ((SQUARE[0].replace("8 a", "8 b"), POLYLINE.replace("8 a", "8 b")), 0),
+    ],
+)
+def test_what_is_drawn_twice_on_a_layer_counts_once_and_is_told(drawn: Read, more: tuple[str, ...], twice: int) -> None:
+    drawing = drawn(*SQUARE, *more)
+    (square,) = drawing.on("a")
+    assert square.closed and len(square.points) == 4
+    assert drawing.notes == ([f"passed over: {twice} × curves that are drawn already, on the same layer"] * bool(twice))
+
+
+def test_a_circle_drawn_twice_is_a_pocket_and_one_hole(drawn: Read) -> None:
+    circle = "0 CIRCLE 8 a 10 2 20 3 40 4"
+    drawing = drawn(
+        circle, circle, circle.replace("40 4", "40 4.001"), "0 POINT 8 a 10 2 20 3", "0 POINT 8 a 10 2 20 3"
+    )
+    circles = np.array([curve.circle for curve in drawing.curves])
+    assert circles == pytest.approx(np.array([(2, 3, 4), (2, 3, 4.001), (2, 3, 0)]))
+
+
+def test_an_ellipse_that_stands_on_the_plane_is_passed_over_and_told(drawn: Read) -> None:
+    drawing = drawn(LYING, LYING + " 210 1 220 0 230 0", LYING + " 210 0 220 0.84147 230 0.54030")
+    assert len(drawing.curves) == 1
+    assert drawing.notes == ["passed over: 2 × objects that do not lie in the plane XY"]
+
+
+@pytest.mark.parametrize(("in_force", "told"), [("71 1", 1), ("71 0", 0)])
+def test_a_block_that_is_clipped_is_drawn_whole_and_that_is_told(tmp_path: Path, in_force: str, told: int) -> None:
+    insert = "0 INSERT 5 A1 102 {ACAD_XDICTIONARY 360 %s 102 } 8 a 2 part 10 0 20 0"
+    drawing = read_dxf(
+        written(
+            tmp_path / "part.dxf",
+            section("BLOCKS", "0 BLOCK 2 part 10 0 20 0", *SQUARE, "0 ENDBLK"),
+            section("ENTITIES", insert % "B0", insert.replace("10 0", "10 50") % "B9"),
+            section(
+                "OBJECTS",
+                "0 DICTIONARY 5 B0 102 {ACAD_REACTORS 330 A1 102 } 330 A1 3 ACAD_FILTER 360 B1",
+                "0 DICTIONARY 5 B1 330 B0 3 SPATIAL 360 B2",
+                f"0 SPATIAL_FILTER 5 B2 330 B1 70 2 10 1 20 1 10 4 20 4 {in_force}",
+                "0 DICTIONARY 5 B9 330 A1 3 ACAD_FIELD 360 BA",
+            ),
+        )
+    )
+    assert [len(curve.points) for curve in drawing.curves] == [4, 4]
+    assert [note.startswith("passed over: 1 × a clip (XCLIP): its block is drawn whole") for note in drawing.notes] == (
+        [True] * told
+    )

@@ -160,6 +160,8 @@ def test_what_is_visible_in_a_hidden_group_is_drawn(drawn: Read) -> None:
     [
         ('clip-path="url(#c)"', "a clip or mask: its object is drawn whole"),
         ('style="mask:url(#c)"', "a clip or mask: its object is drawn whole"),
+        ('marker-end="url(#arrow)" marker-start="url(#arrow)"', "1 × markers, such as arrowheads"),
+        ('stroke="red" style="stroke-dasharray: 3,1"', "the dashes of a stroke, which is cut as one line"),
         ('transform="rotate(90)" transform-origin="50 50"', "a transformation by CSS"),
         ('style="transform: rotate(90deg)"', "a transformation by CSS"),
     ],
@@ -173,6 +175,8 @@ def test_what_is_not_done_to_an_object_is_told(drawn: Read, attribute: str, told
     ("sheet", "told"),
     [
         ("#a { transform: scale(2) }", "a transformation by CSS"),
+        ("#a { clip-path: url(#c) }", "a clip or mask: its object is drawn whole"),
+        (".cut .edge { mask: url(#c) }", "the style sheet's rule for '.cut .edge' that hides, shows, clips"),
         ("path.cut, g path, .cut.old { display: none }", "the style sheet's rule for '.cut.old' that hides"),
     ],
 )
@@ -213,3 +217,72 @@ def test_flowed_text_of_inkscape_is_told(drawn: Read) -> None:
     flowed = f"<flowRoot><flowRegion>{BOX}</flowRegion><flowPara>Part 7</flowPara></flowRoot>"
     drawing = drawn(BOX + flowed)
     assert len(drawing.curves) == len(drawing.notes) == 1 and "1 × text (Path > Object" in drawing.notes[0]
+
+
+def test_lines_drawn_twice_are_cut_once_and_that_is_told(drawn: Read) -> None:
+    spokes = '<path d="M0 0L5 0M0 0L0 5"/><g transform="scale(2)"><path d="M2.5 0H0"/></g><line y2="5" stroke="red"/>'
+    drawing = drawn(spokes)
+    length = sum(np.hypot(*np.diff(curve.points, axis=0).T).sum() for curve in drawing.curves)
+    assert length == pytest.approx(10.0)
+    assert drawing.notes == ["passed over: 2 × curves that are drawn already, on the same layer"]
+
+
+@pytest.mark.parametrize("d", ["M0 0L5 5TZ", "M0 0L5 5 l", "M0 0 Q9 9 5 0 T z M8 8 l1 1", "M", "M0 0LL5 5"])
+def test_a_command_of_a_path_without_its_numbers_is_refused(drawn: Read, d: str) -> None:
+    with pytest.raises(InputError, match=r"path command [TlML] has no numbers"):
+        drawn(f'<path d="{d}"/>')
+
+
+@pytest.mark.parametrize(
+    "attribute",
+    [
+        'style="stroke-dasharray:none;marker:none;clip-path:none"',
+        'stroke="red" stroke-dasharray="0 0"',
+        'stroke-dasharray="3"',
+    ],
+)
+def test_what_does_nothing_to_an_object_is_not_told(drawn: Read, attribute: str) -> None:
+    assert drawn(f"<g {attribute}>{BOX}</g>").notes == []
+
+
+@pytest.mark.parametrize(
+    ("inner", "told"),
+    [
+        ('<svg x="5" y="5" width="20" height="20"><circle cx="10" cy="10" r="10"/></svg>', 0),
+        ('<svg x="5" y="5" width="20" height="20"><circle cx="10" cy="10" r="11"/></svg>', 1),
+        ('<svg x="5" y="5" width="20" height="20" overflow="visible"><circle cx="10" cy="10" r="11"/></svg>', 0),
+        ('<symbol id="s" viewBox="-5 -5 10 10"><circle r="6"/></symbol><use href="#s" width="50" height="50"/>', 1),
+        ('<symbol id="s" viewBox="-5 -5 10 10"><circle r="5"/></symbol><use href="#s" width="50" height="50"/>', 0),
+    ],
+)
+def test_what_reaches_out_of_a_drawing_within_the_drawing_is_drawn_and_told(drawn: Read, inner: str, told: int) -> None:
+    drawing = drawn(inner)
+    assert len(drawing.curves) == 1 and drawing.curves[0].circle
+    assert [note for note in drawing.notes if "the border of a drawing within the drawing" in note] == drawing.notes
+    assert len(drawing.notes) == told
+
+
+def test_one_alternative_of_a_switch_is_drawn(drawn: Read) -> None:
+    german, any_language = '<circle r="3" systemLanguage="de"/>', '<circle r="4"/><circle r="5"/>'
+    drawing = drawn(f'<switch><!-- --><foreignObject requiredExtensions="x"/>{german}{any_language}</switch>')
+    assert [curve.circle[2] for curve in drawing.curves if curve.circle] == pytest.approx([4.0])
+    assert drawing.notes == ["passed over: 1 × foreign content", "passed over: 2 × other alternatives of a <switch>"]
+
+
+@pytest.mark.parametrize(
+    ("size", "inner", "why"),
+    [
+        ("", '<rect width="50%" height="5"/>', "'50%' is of a size that the drawing does not say; give it a viewBox"),
+        ("", '<svg viewBox="0 0 9 9"><circle r="3"/></svg>', "has a drawing within it without a size"),
+        ('width="-200" height="100" viewBox="0 0 200 100"', '<circle r="3"/>', "give it width and height above 0"),
+    ],
+)
+def test_a_size_that_is_not_said_is_refused(drawn: Read, size: str, inner: str, why: str) -> None:
+    with pytest.raises(InputError, match=why):
+        drawn(inner, size)
+
+
+def test_what_is_too_deep_in_groups_is_told(drawn: Read) -> None:
+    drawing = drawn(BOX + "<g>" * 120 + BOX + "</g>" * 120)
+    assert len(drawing.curves) == 1
+    assert drawing.notes == ["passed over: 1 × objects in more than 100 groups within one another (ungroup them)"]

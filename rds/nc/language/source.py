@@ -234,6 +234,8 @@ def open_source(source: str | Path | IO[Any] | Source, name: str = "", *, semico
         return open_file(source, name or str(source), semicolons=semicolons)
     owned = True
     if isinstance(source, str):
+        if source and source.isprintable() and len(source) <= LONGEST and os.path.isfile(source):
+            raise ProgramError("is the name of a file, and a str is the program itself; give Path(...)", file=source)
         stream: IO[bytes] = io.BytesIO(source.encode("utf-8", "surrogatepass"))
     elif isinstance(source, io.BufferedIOBase | io.RawIOBase) and source.seekable():
         stream, owned = source, False

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import asin, ceil, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from rds.core.quantities import near
 CHORD_ERROR = 0.002  # mm: of the chords that stand for curves, a tenth of what a mill of this class repeats
 SAME = 0.01  # mm: ends nearer than this are joined
 MOST_POINTS = 2_000_000  # of a drawing
+_TWICE = 1e-5  # mm: curves nearer than this everywhere are one, drawn twice
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,52 @@ def polyline_curve(points: Sequence[Sequence[float]] | np.ndarray, closed: bool,
     if len(rows) < 2:
         return None
     return Curve(rows, closed and len(rows) > 2, layer)
+
+
+def assembled(curves: Iterable[Curve], name: str, passed_over: dict[str, int]) -> Drawing:
+    """A drawing of these curves: each of a layer once, however often it is drawn, and open ones joined where they meet.
+
+    Drawn twice, two sides of a square would be a way there and back, and a closed curve an island in itself.
+    """
+    once = distinct(curves)
+    whole = distinct(joined(once.kept))
+    passed_over = passed_over | {"curves that are drawn already, on the same layer": once.twice + whole.twice}
+    notes = [f"passed over: {count} × {what}" for what, count in passed_over.items() if count]
+    return Drawing(whole.kept, name, notes)
+
+
+class Distinct(NamedTuple):
+    """The curves of a layer each once, and how many there were besides."""
+
+    kept: list[Curve]
+    twice: int
+
+
+def distinct(curves: Iterable[Curve]) -> Distinct:
+    """The curves without those that run along the whole of an earlier one of their layer, in whichever direction."""
+    found = Distinct([], 0)
+    by_centre: dict[tuple[str, bool, int, float, float], list[Curve]] = {}
+    for curve in curves:
+        x, y = curve.points.mean(axis=0) / (4.0 * _TWICE)
+        sorts = (curve.layer, curve.closed, len(curve.points))
+        near = {(*sorts, np.floor(x + a), np.floor(y + b)) for a in (-0.3, 0.3) for b in (-0.3, 0.3)}
+        if any(_same(curve, other) for key in near for other in by_centre.get(key, ())):
+            found = found._replace(twice=found.twice + 1)
+            continue
+        found.kept.append(curve)
+        by_centre.setdefault((*sorts, np.floor(x), np.floor(y)), []).append(curve)
+    return found
+
+
+def _same(one: Curve, other: Curve) -> bool:
+    """Whether two curves of as many points are the same, wherever they begin and whichever way they go."""
+    a = one.points
+    for b in (other.points, other.points[::-1]):
+        if one.closed:
+            b = np.roll(b, -int(np.hypot(*(b - a[0]).T).argmin()), axis=0)
+        if (abs(a - b) < _TWICE).all():
+            return (one.circle is None) == (other.circle is None)
+    return False
 
 
 def joined(curves: Iterable[Curve]) -> list[Curve]:

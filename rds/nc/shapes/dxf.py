@@ -20,13 +20,14 @@ from rds.nc.shapes.curves import (
     Curve,
     Drawing,
     arc_points,
+    assembled,
     circle_curve,
-    joined,
     polyline_curve,
     steps_of,
 )
 from rds.nc.shapes.dxf_groups import (
     Pairs,
+    clips_of,
     entities_of,
     number_of,
     numbers_of,
@@ -86,9 +87,9 @@ def read_dxf(path: Path, unit: str | None = None) -> Drawing:
         raise InputError("has no ENTITIES section; save it as ASCII DXF (R12 or later)", name)
     scale = UNITS[unit] if unit else _scale(sections.get("HEADER", []), name)
     reader = _Reader(name, scale, _blocks(sections.get("BLOCKS", [])), _off(sections.get("TABLES", [])))
+    reader.clips = clips_of(sections.get("OBJECTS", []))
     reader.take(entities_of(sections["ENTITIES"]), np.array([[scale, 0.0, 0.0], [0.0, scale, 0.0]]), None, 0)
-    notes = [f"passed over: {count} × {what}" for what, count in reader.passed_over.items()]
-    return Drawing(joined(reader.curves), name, notes)
+    return assembled(reader.curves, name, reader.passed_over)
 
 
 def _scale(header: Pairs, name: str) -> float:
@@ -145,6 +146,7 @@ class _Reader:
         self.name, self.scale, self.blocks, self.off = name, scale, blocks, off
         self.curves: list[Curve] = []
         self.passed_over: dict[str, int] = {}
+        self.clips: set[str] = set()
         self.taken = 0  # points of the curves so far; an insert counts as fifty
 
     def _pass_over(self, what: str) -> None:
@@ -180,7 +182,7 @@ class _Reader:
                     self._pass_over("objects on sheets of paper (draw in model space what is to be cut)")
             elif int(number_of(body, 60)) == 1:
                 self._pass_over("hidden objects")
-            elif kind not in _IN_SPACE and self._tilted(kind, body):
+            elif (kind not in _IN_SPACE or kind == "ELLIPSE") and self._tilted(kind, body):
                 self._pass_over("objects that do not lie in the plane XY")
             elif kind == "POLYLINE":
                 if int(number_of(body, 70)) & _MESH:
@@ -233,6 +235,8 @@ class _Reader:
             self._count(50)
             self._pass_over("inserts of blocks that are not in the file")
             return
+        if not self.clips.isdisjoint(value for code, value in body if code == 360):
+            self._pass_over("a clip (XCLIP): its block is drawn whole; explode and trim it, if less is to be cut")
         (bx, by), entities = block
         angle, sx, sy = radians(number_of(body, 50)), number_of(body, 41, 1.0), number_of(body, 42, 1.0)
         c, s = cos(angle), sin(angle)

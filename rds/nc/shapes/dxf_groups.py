@@ -74,6 +74,20 @@ def entities_of(pairs: Pairs) -> Iterator[tuple[str, Pairs]]:
         yield kind, body
 
 
+def clips_of(objects: Pairs) -> set[str]:
+    """Handles of the dictionaries that lead to a clip in force (XCLIP): an insert that has one of them is clipped."""
+    clips: set[str] = set()
+    leads: dict[str, set[str]] = {}
+    for kind, body in entities_of(objects):
+        if kind == "SPATIAL_FILTER" and number_of(body, 71, 1.0):
+            clips.add(text_of(body, 5))
+        elif kind == "DICTIONARY":
+            leads[text_of(body, 5)] = {value for code, value in body if code in (350, 360)}
+    for _ in range(2):  # the insert's dictionary names that of its filters, which names the clip
+        clips |= {handle for handle, to in leads.items() if to & clips}
+    return clips
+
+
 def text_of(body: Pairs, code: int, default: str = "") -> str:
     return next((value for key, value in body if key == code), default)
 

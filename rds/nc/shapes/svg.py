@@ -15,8 +15,9 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.limits import read_limited
-from rds.nc.shapes.curves import CHORD_ERROR, MOST_POINTS, Curve, Drawing, circle_curve, joined, polyline_curve
+from rds.nc.shapes.curves import CHORD_ERROR, MOST_POINTS, Curve, Drawing, assembled, circle_curve, polyline_curve
 from rds.nc.shapes.svg_path import polylines
+from rds.nc.shapes.svg_style import NOT_DONE, PAINT, SIMPLE, declared, not_done, rules_of, tag_of
 
 _LARGEST = 64 << 20  # bytes
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
@@ -32,11 +33,8 @@ _PASSED_OVER = {
 _XLINK = "{http://www.w3.org/1999/xlink}"
 _ASPECT = re.compile(r"x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?")
 _SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}  # of the room that is left, before the drawing
-_PAINT = ("fill", "stroke")
-_RULED = ("display", "visibility", "transform", *_PAINT)  # what is looked for in style sheets
 _UNSEEN = ("none", "transparent")
 _BARE = "objects with fill none and no stroke, which nobody sees; give them a stroke if they are to be cut"
-_SIMPLE = re.compile(r"[.#]?[\w-]+")  # selectors that are followed: of an element's name, class or id
 _SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 _NOT_DRAWN = ("defs", "metadata", "clipPath", "mask", "marker", "pattern", "symbol", "style", "title", "desc")
 DEEPEST = 100  # groups within one another
@@ -64,20 +62,21 @@ def read_svg(path: Path) -> Drawing:
         root = ElementTree.fromstring(data)
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # the last two: of a coding that it names
         raise InputError(f"is no SVG: {error}; save it as plain SVG in UTF-8", name) from error
-    if _tag(root) != "svg":
-        raise InputError(f"is XML, but its first element is <{_tag(root)}>, not <svg>; save it as plain SVG", name)
+    if tag_of(root) != "svg":
+        raise InputError(f"is XML, but its first element is <{tag_of(root)}>, not <svg>; save it as plain SVG", name)
     reader = _Reader(name, root)
     matrix, view = _page(root, name)
     for child in root if reader.is_shown(root, True) else ():
         reader.walk(child, matrix, "", 0, view, paint=reader.paint(root, _PAINTED))
-    notes = [f"passed over: {count} × {what}" for what, count in reader.passed_over.items()]
-    return Drawing(joined(reader.curves), name, notes)
+    return assembled(reader.curves, name, reader.passed_over)
 
 
 def _page(root: ElementTree.Element, name: str) -> tuple[Matrix, View]:
     """From user units to mm with Y upwards and the lower left corner of the page at 0; the size in user units."""
     box, px = _box(root), _MM["px"]
     width, height = (_length(root.get(side), name) for side in ("width", "height"))
+    if min(width, height) < 0.0:
+        raise InputError(f"its size is {width:g} by {height:g} mm; give it width and height above 0", name)
     if box is None:
         return np.array([[px, 0.0, 0.0], [0.0, -px, height or 0.0]]), (width / px, height / px)
     if not (width and height):
@@ -116,30 +115,12 @@ def _length(text: str | None, name: str, per_unit: float | None = None, whole: f
     if match is None:
         raise InputError(f"{text!r} is no length; write a number with mm, cm, in, pt, pc or px", name)
     if match[2] == "%":
+        if per_unit is not None and not whole and float(match[1]):
+            raise InputError(f"{text!r} is of a size that the drawing does not say; give it a viewBox", name)
         return float(match[1]) / 100.0 * whole
     if per_unit is None:
         return float(match[1]) * _MM[match[2]]
     return float(match[1]) * (1.0 if match[2] in ("", "px") else _MM[match[2]] / _MM["px"])
-
-
-def _rules(root: ElementTree.Element) -> dict[str, dict[str, str]]:
-    """What style sheets in the file say of display, visibility, transform and paint, by selector."""
-    found: dict[str, dict[str, str]] = {}
-    for element in root.iter():
-        if _tag(element) == "style":
-            # by splitting: expressions that look for ends take the square of the length where there is none
-            first, *commented = (element.text or "").split("/*")
-            for rule in (first + "".join(text.partition("*/")[2] for text in commented)).split("}"):
-                selectors, _, body = rule.rpartition("{")
-                said = {key: value for key, value in _declared(body).items() if key in _RULED}
-                for selector in selectors.rpartition("{")[2].split(",") if said else ():
-                    found.setdefault(selector.strip(), {}).update(said)
-    return found
-
-
-def _declared(style: str) -> dict[str, str]:
-    pairs = (part.split(":", 1) for part in style.split(";") if ":" in part)
-    return {key.strip(): value.replace("!important", "").strip() for key, value in pairs}
 
 
 class _Reader:
@@ -147,18 +128,18 @@ class _Reader:
         self.name = name
         self.curves: list[Curve] = []
         self.passed_over: dict[str, int] = {}
-        self.rules = _rules(root)
+        self.rules = rules_of(root)
         self.by_id = {element.get("id"): element for element in root.iter() if element.get("id")}
         self.taken = 0  # points so far; an element counts as one, a clone as fifty
         self.cloned: list[ElementTree.Element] = []  # what the clones show that are being drawn
         self.paint_is_known = True
         for selector, said in self.rules.items():
-            if _SIMPLE.fullmatch(selector):
+            if SIMPLE.fullmatch(selector):
                 continue
-            self.paint_is_known &= said.keys().isdisjoint(_PAINT)
-            if not said.keys() <= set(_PAINT):
+            self.paint_is_known &= said.keys().isdisjoint(PAINT)
+            if not said.keys() <= set(PAINT):
                 self._pass_over(
-                    f"the style sheet's rule for {selector[:60]!r} that hides, shows or transforms; "
+                    f"the style sheet's rule for {selector[:60]!r} that hides, shows, clips, dashes or transforms; "
                     "write that at the objects"
                 )
 
@@ -166,7 +147,7 @@ class _Reader:
         """Whether an element is visible, as what it is in is unless it says otherwise; None: nor anything within it."""
         said = {key: element.get(key, "") for key in ("display", "visibility") if element.get(key)}
         said |= self._ruled(element)
-        style = _declared(element.get("style", ""))
+        style = declared(element.get("style", ""))
         said |= {key: value for key, value in style.items() if key in said or key in ("display", "visibility")}
         if said.get("display") == "none":
             return None
@@ -175,15 +156,15 @@ class _Reader:
 
     def paint(self, element: ElementTree.Element, outer: Mapping[str, str]) -> dict[str, str]:
         """Fill and stroke of an element, which are those of what it is in unless it says otherwise."""
-        own = {key: element.get(key, "") for key in _PAINT} | self._ruled(element)
-        own |= _declared(element.get("style", ""))
-        return {key: outer[key] if own[key] in ("", "inherit") else own[key] for key in _PAINT}
+        own = {key: element.get(key, "") for key in PAINT} | self._ruled(element)
+        own |= declared(element.get("style", ""))
+        return {key: outer[key] if own[key] in ("", "inherit") else own[key] for key in PAINT}
 
     def _ruled(self, element: ElementTree.Element) -> dict[str, str]:
         """What the style sheets say of an element."""
         classes = (f".{word}" for word in element.get("class", "").split())
         said: dict[str, str] = {}
-        for selector in (_tag(element), *classes, f"#{element.get('id')}"):
+        for selector in (tag_of(element), *classes, f"#{element.get('id')}"):
             said |= self.rules.get(selector, {})
         return said
 
@@ -199,8 +180,11 @@ class _Reader:
         paint: Mapping[str, str] = _PAINTED,
     ) -> None:
         """The curves of an element and of those within it; `use`: the clone that it is drawn for."""
-        tag = _tag(element)
-        if (tag in _NOT_DRAWN and not (use is not None and tag == "symbol")) or depth > DEEPEST:
+        tag = tag_of(element)
+        if tag in _NOT_DRAWN and not (use is not None and tag == "symbol"):
+            return
+        if depth > DEEPEST:
+            self._pass_over(f"objects in more than {DEEPEST} groups within one another (ungroup them)")
             return
         self._count(1)
         shown = self.is_shown(element, visible)
@@ -211,23 +195,30 @@ class _Reader:
             self._pass_over(_PASSED_OVER[tag])
             return
         paint = self.paint(element, paint)
-        style = _declared(element.get("style", ""))
-        if any((style.get(key) or element.get(key) or "none") != "none" for key in ("clip-path", "mask")):
-            self._pass_over("a clip or mask: its object is drawn whole (Object > Clip > Release, Path > Intersection)")
-        by_style = style.get("transform", self._ruled(element).get("transform", "none"))
+        said = {key: element.get(key, "") for key in (*NOT_DONE, "overflow")} | self._ruled(element)
+        said |= declared(element.get("style", ""))
+        for what in not_done(said, is_stroked=paint["stroke"] not in _UNSEEN):
+            self._pass_over(what)
+        by_style = said.get("transform", "none")
         if by_style != "none" or element.get("transform-origin"):
             self._pass_over(
                 "a transformation by CSS (transform-origin, or transform in a style); write it as transform="
             )
         if element.get("transform"):
             matrix = _times(matrix, _transform(element.get("transform", ""), self.name))
+        frame = None
         if tag in ("svg", "symbol"):
-            matrix, view = self._nested(element, matrix, view, use)
+            matrix, view, frame = self._nested(element, matrix, view, use)
         if tag in ("g", "a", "svg", "switch", "symbol"):
             label = element.get(f"{_INKSCAPE}label") if element.get(f"{_INKSCAPE}groupmode") == "layer" else None
             inner = label or layer or (element.get("id") or "" if tag == "g" else "")
-            for child in element:
+            before = len(self.curves)
+            for child in self._one_of(element) if tag == "switch" else element:
                 self.walk(child, matrix, inner, depth + 1, view, shown, paint=paint)
+            if frame is not None and said["overflow"] in ("visible", "auto"):
+                frame = None
+            if frame is not None and any(_reaches_out(curve.points, *frame) for curve in self.curves[before:]):
+                self._pass_over("the border of a drawing within the drawing, beyond which it is drawn as well")
             return
         if tag == "use":
             target = self.by_id.get((element.get("href") or element.get(f"{_XLINK}href") or "").strip().lstrip("#"))
@@ -241,7 +232,7 @@ class _Reader:
             self.walk(target, moved, layer, depth + 1, view, shown, use=element, paint=paint)
             self.cloned.pop()
             return
-        if tag in _SHAPES and self.paint_is_known and all(paint[key] in _UNSEEN for key in _PAINT):
+        if tag in _SHAPES and self.paint_is_known and all(paint[key] in _UNSEEN for key in PAINT):
             self._pass_over(_BARE)
             return
         for points, closed, circle in self._shape(tag, element, matrix, view):
@@ -259,20 +250,33 @@ class _Reader:
 
     def _nested(
         self, element: ElementTree.Element, matrix: Matrix, view: View, use: ElementTree.Element | None
-    ) -> tuple[Matrix, View]:
-        """What a drawing within the drawing is placed by, and its size in its own units; a clone may set its size."""
+    ) -> tuple[Matrix, View, tuple[Matrix, View]]:
+        """What a drawing within the drawing is placed by, its size in its own units (a clone may set its size), and
+        its border: what places it, and its size in the units of what it is in."""
 
         def number(key: str, whole: float) -> float:
             own = element.get(key, "0" if key in "xy" else "100%")
             given = own if use is None or key in "xy" else use.get(key, own)
-            return _length(given, self.name, _MM["px"], whole)
+            return _length(given, self.name, _MM["px"], whole) if whole or given != "100%" else 0.0
 
         x, y, width, height = (number(key, view[k % 2]) for k, key in enumerate(("x", "y", "width", "height")))
         matrix = _times(matrix, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
         box = _box(element)
         if box is None:
-            return matrix, (width, height)
-        return _times(matrix, _fitted(box, width, height, element)), (box[2], box[3])
+            return matrix, (width, height), (matrix, (width, height))
+        if not (width > 0.0 and height > 0.0):
+            raise InputError("has a drawing within it without a size; give it width and height", self.name)
+        return _times(matrix, _fitted(box, width, height, element)), (box[2], box[3]), (matrix, (width, height))
+
+    def _one_of(self, element: ElementTree.Element) -> list[ElementTree.Element]:
+        """The first of the alternatives of a <switch> that asks for nothing, and can be drawn if one can."""
+        every = [child for child in element if tag_of(child) not in ("comment", *_NOT_DRAWN)]
+        free = [child for child in every if not {"requiredExtensions", "systemLanguage"} & child.attrib.keys()] or every
+        drawn = [child for child in free if tag_of(child) not in _PASSED_OVER] or free
+        for child in every:
+            if child is not drawn[0]:
+                self._pass_over(_PASSED_OVER.get(tag_of(child), "other alternatives of a <switch>"))
+        return drawn[:1]
 
     def _pass_over(self, what: str) -> None:
         self.passed_over[what] = self.passed_over.get(what, 0) + 1
@@ -329,8 +333,13 @@ class _Reader:
             yield np.array(values[: len(values) // 2 * 2]).reshape(-1, 2), tag == "polygon", None
 
 
-def _tag(element: ElementTree.Element) -> str:
-    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else "comment"
+def _reaches_out(points: np.ndarray, matrix: Matrix, size: View) -> bool:
+    """Whether points (mm) lie outside of a border of this size, which `matrix` places."""
+    if abs(np.linalg.det(matrix[:, :2])) < 1e-12 or min(size) <= 0.0:
+        return False
+    within = np.linalg.solve(matrix[:, :2], (points - matrix[:, 2]).T).T
+    beyond = 1e-3 * max(size)  # chords of what touches the border
+    return bool((within < -beyond).any() or (within > np.array(size) + beyond).any())
 
 
 def _moved(points: np.ndarray, matrix: Matrix) -> np.ndarray:

@@ -43,25 +43,34 @@ def polylines(d: str, chord_error: float, where: str) -> Iterator[tuple[np.ndarr
 
 
 def _commands(d: str, where: str) -> Iterator[tuple[str, list[float]]]:
-    command, values = "", []  # type: str, list[float]
+    command, values, bare = "", [], False  # type: str, list[float], bool
     tokens = _split_flags(d, where)
     for word, number in tokens:
         if word:
             if values:
                 raise InputError(f"path command {command} has {len(values)} numbers too few or too many", where)
-            command = word
+            if bare:
+                raise _without_numbers(command, where)
+            command, bare = word, word not in "Zz"
             if command in "Zz":
                 yield command, []
             continue
         if not command or command in "Zz":
             raise InputError(f"a path begins with M, not with {number:g}", where)
         values.append(number)
+        bare = False
         if len(values) == _COUNT[command.upper()]:
             yield command, values
             values = []
             command = {"M": "L", "m": "l"}.get(command, command)
     if values:
         raise InputError(f"path command {command} has too few numbers; save it as plain SVG", where)
+    if bare:
+        raise _without_numbers(command, where)
+
+
+def _without_numbers(command: str, where: str) -> InputError:
+    return InputError(f"path command {command} has no numbers; save it as plain SVG", where)
 
 
 def _split_flags(d: str, where: str) -> Iterator[tuple[str, float]]:

@@ -28,6 +28,7 @@ _DEVICE_NUMBERS = ("VendorNumber", "ProductNumber", "RevisionNumber")
 _DEVICE_WORDS = ("VendorName", "ProductName")
 _VARIABLE, _ARRAY, _RECORD = "7", "8", "9"
 _MAPPINGS = (*range(0x1600, 0x1800), *range(0x1A00, 0x1C00))  # their number of entries may be written
+_ERRORS = 0x1003  # starts without any
 _TEXTS = range(0x09, 0x10)  # data types of texts, times and domains: their values stay as they are
 _REALS = (0x08, 0x11)
 _U8 = "0x5"
@@ -105,12 +106,12 @@ def _objects(sections: Mapping[str, Mapping[str, str | None]]) -> dict[int, dict
     complete: dict[int, dict[int | None, Section]] = {}
     for index, thing in found.items():
         whole = thing.setdefault(None, {"ParameterName": f"0x{index:04X}"})
-        members = {key: section for key, section in thing.items() if key is not None and "DataType" in section}
+        members: dict[int | None, Section] = {
+            key: section for key, section in thing.items() if key is not None and "DataType" in section
+        }
         count = min(int(whole.pop("CompactSubObj", "0")), 254)
         if count and "DataType" in whole:
-            access = whole.get("AccessType", "ro") if index in _MAPPINGS else "ro"
-            members = {0: {"ParameterName": "Entries", "DataType": _U8, "AccessType": access}}
-            members |= {place: dict(whole) for place in range(1, count + 1)}
+            members = _compact(sections, index, whole, count)
         if members:
             kind = whole.get("ObjectType")
             head = {"ParameterName": whole["ParameterName"], "ObjectType": kind if kind == _ARRAY else _RECORD}
@@ -118,6 +119,28 @@ def _objects(sections: Mapping[str, Mapping[str, str | None]]) -> dict[int, dict
         elif "DataType" in whole:
             complete[index] = {None: _variable(whole)}
     return complete
+
+
+def _compact(
+    sections: Mapping[str, Mapping[str, str | None]], index: int, whole: Section, count: int
+) -> dict[int | None, Section]:
+    """The sub-indices of a compact array: as its object, but for the names and values that sections of their own list.
+
+    How many entries there are is the array's length; of a mapping as far as entries are listed, of errors nothing.
+    """
+    names, values = (sections.get(f"{index:04x}{what}", {}) for what in ("name", "value"))
+    access = whole.get("AccessType", "ro") if index in _MAPPINGS else "ro"
+    members: dict[int | None, Section] = {0: {"ParameterName": "Entries", "DataType": _U8, "AccessType": access}}
+    listed = [place for place in range(1, count + 1) if values.get(str(place))]
+    entries = max(listed, default=0) if index in _MAPPINGS else count
+    if entries and index != _ERRORS:
+        members[0]["DefaultValue"] = str(entries)
+    for place in range(1, count + 1):
+        own = {"datatype": whole["DataType"], "defaultvalue": values.get(str(place))} if place in listed else {}
+        members[place] = (
+            whole | _section(own) | {"ParameterName": _line(names.get(str(place))) or whole["ParameterName"]}
+        )
+    return members
 
 
 def _variable(section: Section) -> Section:
