@@ -89,6 +89,16 @@ def test_points_by_hand_open_and_close_what_needs_them() -> None:
     assert (found.criteria[2].score, found.criteria[2].gate) == (4.0, "Error hidden")
 
 
+def test_the_command_says_what_else_points_by_hand_change(tmp_path: Path) -> None:
+    shut = grade("ada", Status.OK, score(points=0.0), behind("effort", 0.0))
+    out = made(tmp_path, shut, replace(shut, student="ben"))
+    told = CliRunner().invoke(
+        app, ["grade", "review", str(out), "--student", "ada", "--criterion", "rms", "--points", "9", "--by", "ann"]
+    )
+    lines = told.output.splitlines()
+    assert lines == ["entry 1: points of ada, by ann", "  Error effort needs it: 8 points, from 0 as measured"]
+
+
 def test_two_graders_count_by_their_mean_until_a_final_word() -> None:
     two = [points(8.0), points(3.0), points(6.0, "bob")]
     found = reviewed(grade(), LATE, None, two)
