@@ -17,7 +17,7 @@ from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import RdsError
 from rds.core.geometry import length
 from rds.core.types import Segment, Source
-from rds.core.values import shown
+from rds.core.values import is_masked, shown
 
 _ROWS_PER_ROW = 10  # how many times more rows than the feed rate asks for are still a slow start and stop
 _SPARE_ROWS = 5000
@@ -113,6 +113,8 @@ def row_of(row: Any, axes: int) -> np.ndarray | tuple[str, str]:
     """A row as an array of shape (3, axes), or the clause and the remedy if it is none."""
     if not isinstance(row, tuple | list | np.ndarray) or len(row) != 3:
         return clauses.ROWS, _REMEDY
+    if is_masked(row):
+        return clauses.FINITE, "a number that is masked is none; fill it, or yield plain arrays"
     try:
         values = np.array([np.array(part, ndmin=1) for part in row])
     except ValueError:

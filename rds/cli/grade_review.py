@@ -54,6 +54,7 @@ def review(
         from rds.grading.batch.finished import read_finished
         from rds.grading.review.entries import Entry, Kind
         from rds.grading.review.new_entries import marks_table, read_marks, say
+        from rds.grading.review.tables import behind
 
         ways = {"--points": points, "--excuse": excuse or None, "--extend-days": extend_days, "--undo": undo}
         chosen = [way for way, given in (ways | {"--marks": marks}).items() if given is not None]
@@ -96,6 +97,8 @@ def review(
         return
     for entry in entries:
         typer.echo(f"entry {entry.number}: {entry.kind} of {entry.about or entry.value}, by {entry.by}")
+        for line in behind(finished, entry):
+            typer.echo(f"  {line}")
     if log:
         _show_log(finished)
     elif not said and write_marks is None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.values import shown
+from rds.core.values import is_masked, shown
 
 MOST = 16  # signals of a controller: each is a column for each axis
 LONGEST_NAME = 40  # characters
@@ -105,7 +105,7 @@ def _numbers(value: Any, name: str, axes: int) -> Any:
         array = np.asarray(value)
     except ValueError:  # parts of different lengths
         array = np.empty(0, dtype=object)
-    right = array.dtype.kind in "fiu" and (array.shape == (axes,) if axes else array.size == 1)
+    right = not is_masked(value) and array.dtype.kind in "fiu" and (array.shape == (axes,) if axes else array.size == 1)
     if not right or not np.isfinite(array).all():
         raise ValueError(f"the signal {name!r} is {shown(value)}")
     return array.astype(float).tolist() if axes else float(array.reshape(-1)[0])

@@ -52,6 +52,20 @@ def is_table(values: Any) -> bool:
     return len(sizes) > 1 and max(sizes) > 1
 
 
+def is_masked(value: Any) -> bool:
+    """Whether it is one of numpy's masked arrays, or a list of them, with a number that is masked: that is no answer.
+
+    `np.asarray` would take the number under the mask for one.
+    """
+    parts = value if isinstance(value, list | tuple) else (value,)
+    for part in parts:
+        if type(part) is not float and type(part) is not np.ndarray and isinstance(part, np.ndarray):
+            mask = getattr(part, "mask", False)  # of another class this may be anything
+            if not callable(mask) and np.any(mask):
+                return True
+    return False
+
+
 def own_copy(value: Any, what: str, where: str | None = None) -> Any:
     """A copy that shares nothing with `value`, which is the `what` of the error's sentence.
 

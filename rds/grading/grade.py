@@ -55,6 +55,8 @@ class CriterionScore:
     visible: bool = True  # whether the student may see the value and the bands before grades are out
     case: str = ""  # the case that decided it
     gate: str = ""  # the heading of the criterion that it requires, where that took points
+    ungated: float | None = None  # points before what it requires took some; None where it requires nothing
+    gates: Mapping[str, float] = field(default_factory=dict)  # by required criterion the share that it leaves, 0 to 1
 
 
 @dataclass(frozen=True, slots=True)

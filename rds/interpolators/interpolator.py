@@ -19,6 +19,7 @@ from rds.core.options import read_options
 from rds.core.quantities import listed, shortened
 from rds.core.signature import form
 from rds.core.types import ArcSegment, Segment, Source
+from rds.core.values import is_masked
 from rds.interpolators import DEFAULT, LIBRARY
 from rds.interpolators.division import Method, check_steps
 from rds.interpolators.reference_word import Steps, steps
@@ -123,6 +124,8 @@ class Interpolator:
 
     def _row(self, row: Any, axes: int, k: int) -> np.ndarray:
         try:
+            if is_masked(row):
+                raise TypeError
             values = np.array(row, dtype=float)  # by far the most frequent form
             if values.shape != (3, axes):
                 values = np.array([np.atleast_1d(np.asarray(part, dtype=float)) for part in row])

@@ -9,6 +9,7 @@ from numbers import Real
 from typing import Any
 
 from rds.core.errors import ContractError
+from rds.core.values import is_masked
 from rds.machines.encoder import counted
 
 Limits = tuple[float, float, float]  # lowest and highest output, and step between levels, V; 0 for no levels
@@ -23,8 +24,7 @@ def as_voltage(value: Any) -> float:
         return value
     number = value
     if getattr(value, "size", None) == 1 and getattr(getattr(value, "dtype", None), "kind", "") in ("f", "i", "u"):
-        mask = getattr(value, "mask", False)  # of numpy's masked arrays: what is under it is no answer
-        number = None if not callable(mask) and mask else value.item()
+        number = None if is_masked(value) else value.item()
     try:
         if isinstance(number, Real) and not isinstance(number, bool) and isfinite(number):
             return float(number)

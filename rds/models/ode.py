@@ -18,7 +18,7 @@ from rds.core.errors import ContractError, InputError
 from rds.core.integrate import SUBSTEPS, rk4
 from rds.core.timed_motion import TimedMotion
 from rds.core.types import Model, Source
-from rds.core.values import is_table, shown
+from rds.core.values import is_masked, is_table, shown
 
 Function = Callable[..., Any]
 
@@ -171,6 +171,8 @@ def _flat(answer: Any) -> np.ndarray:
 
 
 def _numbers(answer: Any) -> np.ndarray:
+    if is_masked(answer):
+        raise TypeError
     array = np.asarray(answer)
     if array.dtype.kind not in "fiub":  # None, which numpy would take for NaN, text, complex numbers
         raise TypeError

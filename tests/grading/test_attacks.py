@@ -12,10 +12,22 @@ import pytest
 from rds.grading.grade import Status
 from rds.grading.sandbox import Pool
 from tests.grading.attacked import HONEST, SAMPLES, Machine, Outcome, run
-from tests.grading.attacks import PATIENT, Attack, changing, leaving, looking, lying, seeming, taking
+from tests.grading.attacks import (
+    PATIENT,
+    Attack,
+    changing,
+    escaping,
+    forging,
+    leaving,
+    looking,
+    lying,
+    seeming,
+    spying,
+    taking,
+)
 
 Written = Callable[..., Path]
-KINDS = (changing, leaving, looking, lying, seeming, taking)
+KINDS = (changing, escaping, forging, leaving, looking, lying, seeming, spying, taking)
 ATTACKS: dict[str, Attack] = {name: attack for kind in KINDS for name, attack in kind.ATTACKS.items()}
 
 

@@ -238,6 +238,18 @@ def test_two_students_never_share_a_line(tmp_path: Path) -> None:
     assert done.students == 0
 
 
+def test_comments_count_in_the_gradebook_s_own_points(tmp_path: Path) -> None:
+    sheet = tmp_path / "worksheet.csv"
+    sheet.write_text(WORKSHEET.replace("30.00", "6.00"), encoding="utf-8")
+    late = replace(from_platform("moodle", "Ada Lovelace_501", id="501"), late_days=1.0, before_penalty=28.0)
+    done = exported(tmp_path, "moodle", [late], ExportOptions(gradebook=sheet, points=6.0))
+    ada, _ = rows_of(Path(done.files[0]))
+    said = ada["Feedback comments"]
+    assert ada["Grade"] == "5.2" and "5.2 of 6 points (26 of the 30 points on the feedback page)." in said
+    assert "Error rms: 1.2 of 2 points." in said and "Error hidden: 4 of 4 points." in said
+    assert "1 days late: 0.4 points are lost." in said
+
+
 def test_moodle_worksheet_is_filled_in_and_otherwise_the_same(tmp_path: Path) -> None:
     sheet = tmp_path / "worksheet.csv"
     sheet.write_text(WORKSHEET, encoding="utf-8")

@@ -20,6 +20,7 @@ from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.bands import Bands
 from rds.grading.exports.pictures import pictures_of
 from rds.grading.feedback.band_bar import band_bar
+from rds.grading.feedback.causes_of_errors import error_panels
 from rds.grading.feedback.chart import Curve, Panel, chart, ticks
 from rds.grading.feedback.class_report import class_page
 from rds.grading.feedback.feedback import feedback_page
@@ -120,6 +121,30 @@ def test_hidden_cases_and_values_are_shown_only_if_the_assignment_says_so(assign
     assert "Hidden cases, not shown: 1" in page
     whole = feedback_page(replace(assignment, feedback="all"), grade(), runs)
     assert "secret 0.23 mm" in whole and whole.count("<img") == 2
+
+
+def test_points_lost_only_in_hidden_criteria_are_said_to_be_lost_there(assignment: Assignment) -> None:
+    lost = score("hidden", 0.0, 20.0, visible=False, sentence="secret 0.23 mm")
+    full = score("rms", 10.0)
+    page = feedback_page(assignment, grade("ada", Status.OK, full, lost), [run_with(0.01)])
+    assert "hidden criteria, whose values are not shown, were not met in full" in page and "secret" not in page
+    assert "not met in full" not in feedback_page(assignment, grade("ada", Status.OK, full), [run_with(0.01)])
+    unknown = replace(lost, band=Band.REVIEW, value=None)  # nobody knows whether it was met
+    assert "not met in full" not in feedback_page(assignment, grade("ada", Status.OK, full, unknown))
+
+
+def test_a_command_beyond_the_limit_is_no_voltage() -> None:
+    """The converter gives no more than its limit: what goes beyond is the command. The limits' labels are outside."""
+    near = run_with(0.1)
+    columns = {**near.result.columns, "X_command": 8.0 * near.result["X_command"]}
+    far = replace(near, result=Result(columns, near.result.units, near.result.meta))
+    picture = case_picture([far], (), "A sine")
+    assert picture is not None and ">X command voltage [V]<" in picture.chart.svg
+    assert all(">X command voltage [V]<" in chart([panel]).svg for panel in error_panels(far)[1:])
+    lines = [float(each) for each in re.findall(r'<path d="M0 ([\d.]+)h', picture.chart.svg)]
+    labels = [float(each) for each in re.findall(r'y="([\d.]+)" [^>]*>limit<', picture.chart.svg)]
+    low, high = lines  # of -10 V and of +10 V, counted from above
+    assert labels[0] > low > high > labels[1]
 
 
 def test_the_worst_of_several_runs_is_shown_beside_the_same_run_of_the_solution() -> None:
@@ -232,6 +257,16 @@ def test_the_class_page_names_what_needs_a_look_first() -> None:
     assert "12.30" in page
     # the mean leaves out whom the grader failed
     assert re.search(r"<td>total</td><td class=\"number\">13</td>", page)
+
+
+@pytest.mark.parametrize("criteria", [3, 12])
+def test_the_class_page_gives_a_reason_a_row_of_its_own_however_many_criteria_there_are(criteria: int) -> None:
+    """As the last of many columns it was out of sight on a screen of 1100 pixels."""
+    scores = [score(f"criterion {k}") for k in range(criteria)]
+    page = "".join(class_page("T", [grade("ada", Status.TIMED_OUT, *scores), grade("bob", Status.OK, *scores)], {}))
+    told = re.findall(r'<tr class="reason"><td colspan="(\d+)"><p>([^<]+)</p></td></tr>', page)
+    assert told == [(str(3 + criteria), "control() returned nan at t = 0.5 s")]
+    assert ">reason<" not in page
 
 
 def test_the_class_page_says_which_criteria_could_not_be_measured() -> None:

@@ -17,9 +17,12 @@ import pytest
 
 import rds
 from rds.grading.assignment.assignment import Assignment, read_assignment
+from rds.grading.assignment.late_rules import LateRules
 from rds.grading.assignment.trusted import TrustedFiles
 from rds.grading.batch.grade_one import grade, grade_with_runs
 from rds.grading.grade import Band, CriterionScore, Grade, Status
+from rds.grading.review.applied import reviewed
+from rds.grading.review.entries import Entry, Kind
 from rds.grading.sandbox import Limits, Pool
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
 
@@ -203,6 +206,9 @@ def test_points_that_need_others(made: Make, tmp_path: Path) -> None:
     bound = grade(made(HEAD + SINE + RMS + effort + 'requires = ["rms"]\n'), idle, "ada", TrustedFiles())
     assert [each.score for each in free.criteria] == [0.0, 10.0]
     assert [each.score for each in bound.criteria] == [0.0, 0.0]
+    assert bound.criteria[1].ungated == 10.0 and bound.criteria[1].gates == {"rms": 0.0}
+    by_hand = Entry(Kind.POINTS, "ann", "ada", criterion="rms", value=5.0)
+    assert reviewed(Grade.from_json(bound.to_json()), LateRules(), None, [by_hand]).score == 15.0
     assert (
         bound.criteria[1].value == 0.0 and "counts only where points are earned for rms" in bound.criteria[1].sentence
     )

@@ -19,7 +19,7 @@ from rds.grading.course.class_list import ClassList, Member, read_class_list
 from rds.grading.exports.export import export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.feedback.feedback import feedback_page
-from rds.grading.grade import Band, Grade, Status
+from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.grading.review.applied import of_review, reviewed
 from rds.grading.review.best import best
 from rds.grading.review.class_grades import class_grades
@@ -60,6 +60,43 @@ def test_a_grader_settles_what_could_not_be_measured() -> None:
     unknown = replace(score(), band=Band.REVIEW, value=None)
     found = reviewed(grade("ada", Status.OK, unknown), LATE, None, [points(10.0)])
     assert not found.for_review and found.criteria[0].band is Band.FULL
+
+
+def behind(name: str, factor: float, **more: object) -> CriterionScore:
+    """A criterion of 10 points that earned 8 before the gate `rms`, which leaves `factor` of them."""
+    left = 8.0 * factor
+    return score(name, left, ungated=8.0, gates={"rms": factor}, gate="Error rms" if factor < 1.0 else "", **more)
+
+
+def test_points_by_hand_open_and_close_what_needs_them() -> None:
+    shut = grade("ada", Status.OK, score(points=0.0), behind("effort", 0.0), behind("other", 0.0, visible=False))
+    found = reviewed(shut, LATE, None, [points(10.0)])
+    assert [each.score for each in found.criteria] == [10.0, 8.0, 8.0] and found.score == 26.0
+    effort = found.criteria[1]
+    assert (effort.gate, effort.band) == ("", Band.PARTIAL)
+    assert effort.sentence.endswith("Error rms was set by hand: 8 of 10 points count here, from 0 as measured.")
+    found = reviewed(shut, LATE, None, [points(1.0)])  # 10 % of a gate that takes nothing from 25 % on
+    assert [each.score for each in found.criteria] == [1.0, 3.2, 3.0]  # hidden ones in steps of a twentieth
+    found = reviewed(shut, LATE, None, [points(10.0), points(0.0, criterion="effort")])
+    assert [each.score for each in found.criteria] == [10.0, 0.0, 8.0]
+    full = grade("ada", Status.OK, score(), behind("effort", 1.0))
+    found = reviewed(full, LATE, None, [points(0.0)])
+    assert found.score == 0.0 and found.criteria[1].gate == "Error rms" and found.criteria[1].band is Band.NONE
+    assert reviewed(full, LATE, None, [points(5.0)]).criteria[1] == full.criteria[1]
+    assert reviewed(found, LATE, None, [points(6.0)]).score == 14.0  # the best of attempts is reviewed once more
+    two = replace(behind("effort", 0.0), gates={"rms": 0.0, "hidden": 0.5})
+    found = reviewed(grade("ada", Status.OK, score(points=0.0), score("hidden", 1.0), two), LATE, None, [points(9.0)])
+    assert (found.criteria[2].score, found.criteria[2].gate) == (4.0, "Error hidden")
+
+
+def test_the_command_says_what_else_points_by_hand_change(tmp_path: Path) -> None:
+    shut = grade("ada", Status.OK, score(points=0.0), behind("effort", 0.0))
+    out = made(tmp_path, shut, replace(shut, student="ben"))
+    told = CliRunner().invoke(
+        app, ["grade", "review", str(out), "--student", "ada", "--criterion", "rms", "--points", "9", "--by", "ann"]
+    )
+    lines = told.output.splitlines()
+    assert lines == ["entry 1: points of ada, by ann", "  Error effort needs it: 8 points, from 0 as measured"]
 
 
 def test_two_graders_count_by_their_mean_until_a_final_word() -> None:
@@ -125,7 +162,7 @@ def test_pages_and_tables_follow_and_name_no_grader(tmp_path: Path) -> None:
     say(out, [points(10.0, by="grader-ann", comment="Well <b>argued</b>.", why="secret reason")])
     page = (out / "students/ada/feedback.html").read_text()
     assert "30 of 30 points" in page and "Well &lt;b&gt;argued" in page and "secret reason" not in page
-    assert "grader-ann" not in page and "goes by the points as measured" in page
+    assert "grader-ann" not in page and "Points were set by hand" in page
     assert all(words in (out / "index.html").read_text() for words in ("secret reason", "grader-ann"))
     rows = list(csv.DictReader((out / "grades.csv").open(encoding="utf-8-sig")))
     assert [row["score"] for row in rows] == ["30", "26"]

@@ -281,6 +281,8 @@ class _Work:
         found = {criterion.name: self._score(criterion) for criterion in self.criteria}
         for criterion in self.criteria:
             gates = {name: self._passes(name, criterion.cases) for name in criterion.requires if name in found}
+            if gates:  # kept, so that points by hand for one of them can open or close it again
+                found[criterion.name] = replace(found[criterion.name], ungated=found[criterion.name].score, gates=gates)
             name = min(gates, key=lambda each: gates[each], default="")
             if name and gates[name] < 1.0 and found[criterion.name].band not in (Band.NONE, Band.REVIEW):
                 is_known = found[name].band is not Band.REVIEW

@@ -106,9 +106,7 @@ class Criterion:
 
         What earns a little, or not all, is never rounded to nothing, or to all.
         """
-        if self.is_visible or self.tests or not 0.0 < share < 1.0:
-            return share
-        return min(max(round(share * STEPS), 1), STEPS - 1) / STEPS
+        return share if self.is_visible or self.tests else in_steps(share)
 
     @property
     def meaning(self) -> str:
@@ -140,6 +138,11 @@ class Criterion:
         return CriterionScore(
             self.name, self.title, rounded, self.max_score, value, self.unit, band, sentence, self.is_visible, case
         )
+
+
+def in_steps(share: float) -> float:
+    """The nearest of `STEPS` steps between nothing and all, which are themselves for nothing less and nothing more."""
+    return min(max(round(share * STEPS), 1), STEPS - 1) / STEPS if 0.0 < share < 1.0 else share
 
 
 _SHARE = Quantity("share of the points", "", 0.0, 1.0)

@@ -29,7 +29,7 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
 
 def results(grade: Grade, pictures: Sequence[Picture], factor: float = 1.0) -> dict[str, Any]:
     """What Gradescope reads. Who could not be graded, or is excused, has no score: it then says that it failed."""
-    shown = [f"<p>{escape(line)}</p>" for line in of_grade(grade).split("\n") if line]
+    shown = [f"<p>{escape(line)}</p>" for line in of_grade(grade, factor).split("\n") if line]
     shown += [f'<p>{escape(p.label)}</p><img alt="{escape(p.label)}" src="{escape(p.url)}">' for p in pictures]
     if text := printed(grade):
         shown.append(f"<pre>{escape(text)}</pre>")

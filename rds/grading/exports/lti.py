@@ -67,7 +67,7 @@ def _send(connector: Any, found: Launched, grade: Grade, finished: Finished, fac
 
     when = datetime.now(UTC).isoformat(timespec="milliseconds")
     score = Score().set_score_given(float(scaled(grade.score, factor))).set_user_id(found.user).set_timestamp(when)
-    score.set_score_maximum(float(scaled(finished.max_score, factor))).set_comment(of_grade(grade))
+    score.set_score_maximum(float(scaled(finished.max_score, factor))).set_comment(of_grade(grade, factor))
     score.set_activity_progress("Completed").set_grading_progress("FullyGraded")
     about: Any = {"lineitem": found.lineitem, "scope": list(found.scopes)}
     service = AssignmentsGradesService(connector, about)

@@ -50,7 +50,7 @@ def export(finished: Finished, wanted: ExportOptions) -> Exported:
         _check_points(finished, sheet, row, factor, wanted)
         row[at] = scaled(grade.score, factor)
         if comments is not None:
-            row[comments] = comment(grade).replace(_ESCAPE, "&#92;")
+            row[comments] = comment(grade, factor).replace(_ESCAPE, "&#92;")
     excused, _ = find(finished.excused, sheet, KEYS)
     name = "Full name" if sheet.at("Full name") is not None else "Email address"
     return Exported({FILE: sheet.to_bytes()}, unmatched, unknown(sheet, [*found, *excused], name), len(found))

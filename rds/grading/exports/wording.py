@@ -15,17 +15,24 @@ def of_criterion(score: CriterionScore) -> str:
     return one_line(score.sentence, 1000) if score.visible else HIDDEN
 
 
-def of_grade(grade: Grade) -> str:
-    """Status, and lateness and points where there are some, in lines."""
+def of_grade(grade: Grade, factor: float = 1.0) -> str:
+    """Status, and lateness and points where there are some, in lines; the gradebook's points are `factor` of ours."""
     lines = []
     if grade.status is not Status.OK:
         lines.append(f"{grade.status}: {one_line(grade.reason, 1000)}")
     if grade.status in (Status.GRADER_ERROR, Status.EXCUSED):
         return lines[0]
     if grade.late_days > 0.0:
-        lines.append(f"{grade.late_days:.3g} days late: {grade.before_penalty - grade.score:.4g} points are lost.")
-    lines.append(f"{grade.score:.4g} of {grade.max_score:.4g} points.")
+        lost = factor * (grade.before_penalty - grade.score)
+        lines.append(f"{grade.late_days:.3g} days late: {lost:.4g} points are lost.")
+    own = "" if factor == 1.0 else f" ({grade.score:.4g} of the {grade.max_score:.4g} points on the feedback page)"
+    lines.append(f"{of_most(grade, factor)}{own}.")
     return "\n".join(lines)
+
+
+def of_most(earned: Grade | CriterionScore, factor: float) -> str:
+    """The points earned, of how many, as a gradebook counts them."""
+    return f"{factor * earned.score:.4g} of {factor * earned.max_score:.4g} points"
 
 
 def printed(grade: Grade) -> str:
@@ -33,8 +40,8 @@ def printed(grade: Grade) -> str:
     return "\n".join(plain(note) for note in grade.notes)
 
 
-def comment(grade: Grade) -> str:
-    """Everything in a few lines of HTML, for a gradebook's field of comments."""
-    lines = of_grade(grade).split("\n")
-    lines += [f"{s.title}: {s.score:.4g} of {s.max_score:.4g} points. {of_criterion(s)}" for s in grade.criteria]
+def comment(grade: Grade, factor: float = 1.0) -> str:
+    """Everything in a few lines of HTML, for a gradebook's field of comments; `factor` as of `of_grade`."""
+    lines = of_grade(grade, factor).split("\n")
+    lines += [f"{s.title}: {of_most(s, factor)}. {of_criterion(s)}" for s in grade.criteria]
     return "<br>".join(escape(one_line(line, 1500)) for line in lines)

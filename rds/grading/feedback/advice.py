@@ -40,6 +40,10 @@ class Advice:
 _NOTHING_RAN = (Status.MISSING, Status.REFUSED, Status.FAILED_TO_LOAD)
 _OF_ERRORS, _OF_STEPS = "rds.grading.feedback.causes_of_errors", "rds.grading.feedback.causes_of_steps"
 _OF_LOOPS, _OF_OTHERS = "rds.grading.feedback.causes_of_loops", "rds.grading.feedback.causes_of_others"
+_UNSEEN = (
+    "Nothing is to be changed in what is explained here. Points are missing because hidden criteria, whose values are "
+    "not shown, were not met in full: your file does less well in what you cannot see than in what you can."
+)
 CAUSES: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(("mean-error", "max-error", "rms-error", "contour-error", "path-followed"), _OF_ERRORS),
@@ -55,17 +59,19 @@ CAUSES: Mapping[str, str] = MappingProxyType(
 
 
 def advice(assignment: Assignment, grade: Grade, runs: Sequence[CaseRun]) -> Advice | None:
-    """What to change first; None where no points are lost, or only in what the student does not see.
+    """What to change first; None where no points are lost, or only in what waits for a review.
 
-    Where a gate takes the points, it is the gate that is to be mended.
+    Where a gate takes the points, it is the gate that is to be mended. Of what the student does not see, it says that
+    points are lost there, and nothing else.
     """
     shows_all = assignment.feedback == "all"
     seen = [score for score in grade.criteria if (score.visible or shows_all) and score.band is not Band.REVIEW]
     if grade.status in _NOTHING_RAN:
         return Advice(f"Nothing could be run: {one_line(grade.reason, 600)}") if seen else None
     lost = max(seen, key=lambda score: score.max_score - score.score, default=None)
-    if lost is None or lost.max_score - lost.score <= 1e-9 * lost.max_score:
-        return None
+    if lost is None or not _loses(lost):
+        unseen = [s for s in grade.criteria if not (s.visible or shows_all) and s.band is not Band.REVIEW]
+        return Advice(_UNSEEN) if any(map(_loses, unseen)) else None
     gate = next((score for score in seen if lost.gate and score.title == lost.gate), None)
     target = gate or lost
     most = max(score.max_score - score.score for score in grade.criteria)
@@ -86,6 +92,10 @@ def advice(assignment: Assignment, grade: Grade, runs: Sequence[CaseRun]) -> Adv
     return Advice(
         head + found.sentence, chart(found.panels), f"{case.title}: where the points for {target.title} are lost"
     )
+
+
+def _loses(score: CriterionScore) -> bool:
+    return score.max_score - score.score > 1e-9 * score.max_score
 
 
 def _worst(criterion: Criterion, score: CriterionScore, runs: Sequence[CaseRun]) -> CaseRun | None:

@@ -11,7 +11,7 @@ from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.criterion import Criterion
 from rds.grading.criteria.measuring import NotMeasured, actual, error_of, used
 from rds.grading.feedback.advice import Cause
-from rds.grading.feedback.chart import Curve, Panel
+from rds.grading.feedback.chart import VOLTAGES, Curve, Panel
 from rds.grading.grade import CriterionScore
 from rds.results import Result
 from rds.results.units import heading
@@ -201,11 +201,12 @@ def _panel(run: CaseRun, axis: str, error: np.ndarray, part: Part | None, unit: 
 
 def voltage_panel(run: CaseRun, axis: str) -> Panel:
     """What the controller asks for, with the converter's limits."""
-    name = f"{axis}_command" if f"{axis}_command" in run.result else f"{axis}_voltage"
+    word = "command" if f"{axis}_command" in run.result else "voltage"
     levels = [(float(each), "limit") for each in run.fact("limits") or () if np.isfinite(each)]
-    curve = Curve("voltage", run.result["time"], run.result[name], BLUE)
+    label = heading(f"{axis} {VOLTAGES[word]}", "V")
+    curve = Curve(VOLTAGES[word], run.result["time"], run.result[f"{axis}_{word}"], BLUE)
     most = 1.5 * max((abs(level) for level, _ in levels), default=0.0) or None
-    return Panel([curve], heading(f"{axis} voltage", "V"), levels=levels, most=most)
+    return Panel([curve], label, levels=levels, most=most)
 
 
 def error_panels(run: CaseRun) -> tuple[Panel, ...]:

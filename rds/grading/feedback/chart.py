@@ -22,6 +22,8 @@ _COLUMNS = 360  # of which a curve keeps lowest and highest
 _MOST_POINTS = 1500  # of a path
 _FAR = 4.0  # times the range of what is expected: a curve that goes further is cut
 _MOST = 1e12  # of any number that is drawn: beyond it doubles have no small differences
+VOLTAGES = {"command": "command voltage", "voltage": "voltage"}
+"""What is drawn of a controller, by its column: the command if there is one, which can be beyond the limit."""
 _GRID, _TEXT = "#E2E2E2", "#3A3A3A"
 
 
@@ -145,9 +147,12 @@ def _panel(panel: Panel, top: int, height: int) -> tuple[str, bool]:
             parts.append(
                 f'<path d="M0 {at:.0f}h{10 * width}" stroke="{_TEXT}" stroke-width="8" stroke-dasharray="20 40"/>'
             )
+            # beyond the line where there is room, with a rim of white: curves pass behind it
+            is_above = at > 150 and (level >= 0.0 or at > 10 * height - 150)
             parts.append(
-                f'<text x="{10 * width - 20}" y="{at - 30 if at > 150 else at + 110:.0f}" text-anchor="end" '
-                f'font-size="100">{escape(label)}</text>'
+                f'<text x="{10 * width - 20}" y="{at - 30 if is_above else at + 110:.0f}" text-anchor="end" '
+                'font-size="100" stroke="#ffffff" stroke-width="40" stroke-linejoin="round" paint-order="stroke">'
+                f"{escape(label)}</text>"
             )
     return "".join(parts) + "</svg>", is_cut
 

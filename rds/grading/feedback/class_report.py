@@ -22,7 +22,9 @@ _SLOWEST = 5  # of the class that are listed
 _STYLE = f"""<style>
 .cards {{ display: flex; flex-wrap: wrap; gap: 1rem 2.5rem; }} .cards figure {{ margin: 0; max-width: 412px; }}
 figcaption {{ font-weight: 600; }} td, p {{ overflow-wrap: anywhere; }} td {{ max-width: 28rem; }}
-td.number, td.status {{ white-space: nowrap; }} td.reason {{ min-width: 22rem; }}
+td.number, td.status {{ white-space: nowrap; }} .everybody tbody tr {{ background: none; }}
+.told td:not([rowspan]) {{ border-bottom: 0; }} .reason td {{ padding-top: 0; max-width: none; }}
+.reason p {{ margin: 0; position: sticky; left: .4rem; width: calc(min(100vw, 1280px) - 14.5rem); min-width: 12rem; }}
 .everybody td:first-child {{ min-width: 9rem; }}
 td.gate {{ color: var(--missed); font-weight: 700; }} td.review {{ color: var(--void); font-weight: 700; }}
 {histogram.STYLE}</style>"""
@@ -194,8 +196,8 @@ def _slowest(grades: Sequence[Grade], links: Mapping[str, str], seconds: Mapping
 
 def _everybody(grades: Sequence[Grade], links: Mapping[str, str]) -> Iterator[str]:
     criteria = criteria_of(grades)
-    heads = ["student", "status", "score", "late [days]", *(criterion.name for criterion in criteria), "reason"]
-    texts = ("student", "status", "reason")
+    heads = ["student", "status", "score", "late [days]", *(criterion.name for criterion in criteria)]
+    texts = ("student", "status")
     kinds = ["" if each in texts else ' class="number"' for each in heads]
     head = "".join(
         f'<th scope="col"{kind}>{escape(one_line(each))}</th>' for each, kind in zip(heads, kinds, strict=True)
@@ -209,6 +211,7 @@ def _everybody(grades: Sequence[Grade], links: Mapping[str, str]) -> Iterator[st
 
 
 def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) -> str:
+    """A row; the reason stands below it, in sight however many criteria there are."""
     is_graded = grade.status not in (Status.GRADER_ERROR, Status.EXCUSED)
     scores = {score.name: score for score in grade.criteria} if is_graded else {}
     cells = [
@@ -217,10 +220,13 @@ def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) ->
     ]
     numbers = "".join(f'<td class="number">{each}</td>' for each in cells)
     numbers += "".join(_cell(scores.get(name)) for name in criteria)
+    why = escape(one_line(grade.reason, 300))
+    below = f'<tr class="reason"><td colspan="{3 + len(criteria)}"><p>{why}</p></td></tr>' if why else ""
+    begin = '<tr class="told"><td rowspan="2">' if why else "<tr><td>"
     return (
-        f'<tr><td>{_name(grade.student, links)}</td><td class="status">{escape(str(grade.status))}'
-        f"{' (reviewed)' if is_changed(grade) else ''}</td>{numbers}"
-        f'<td class="reason">{escape(one_line(grade.reason, 300))}</td></tr>'
+        f"{begin}{_name(grade.student, links)}</td>"
+        f'<td class="status">{escape(str(grade.status))}{" (reviewed)" if is_changed(grade) else ""}</td>'
+        f"{numbers}</tr>{below}"
     )
 
 

@@ -120,10 +120,7 @@ def _said_by_graders(grade: Grade) -> str:
         f"{titles.get(each['criterion'], '')}: {each['text']}".removeprefix(": ") for each in review.get("comments", ())
     ]
     if any(each["kind"] == "points" for each in review.get("entries", ())):
-        lines.append(
-            "Points were set by hand. What to change first, and what is said of one criterion that needs another, goes "
-            "by the points as measured."
-        )
+        lines.append("Points were set by hand. What to change first goes by the points as measured.")
     if days := review.get("extension_days"):
         lines.append(f"Your due time was moved by {days:.3g} days.")
     if spent := review.get("late_days_spent"):

@@ -9,7 +9,7 @@ import numpy as np
 
 from rds.core.colours import BLUE, GREEN, GREY, VERMILLION
 from rds.grading.cases.case import CaseRun
-from rds.grading.feedback.chart import Chart, Curve, Panel, chart
+from rds.grading.feedback.chart import VOLTAGES, Chart, Curve, Panel, chart
 from rds.grading.feedback.plain_text import one_line
 from rds.results import Result
 from rds.results.metrics import tracking_error
@@ -99,9 +99,10 @@ def _control_panels(run: CaseRun, beside: Result | None, axes: Sequence[str]) ->
     limits = run.fact("limits")
     levels = [(float(each), "limit") for each in limits or () if np.isfinite(each)]
     for axis in axes:
-        name = f"{axis}_command" if f"{axis}_command" in result else f"{axis}_voltage"
-        if name in result:
-            panels.append(Panel(_pair(result, beside, name), heading(f"{axis} voltage", "V"), levels=levels))
+        word = next((word for word in VOLTAGES if f"{axis}_{word}" in result), "")
+        if word:
+            curves = _pair(result, beside, f"{axis}_{word}")
+            panels.append(Panel(curves, heading(f"{axis} {VOLTAGES[word]}", "V"), levels=levels))
     return panels
 
 

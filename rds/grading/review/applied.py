@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import asdict, replace
 from statistics import mean
 from typing import Any
 
 from rds.grading.assignment.late_rules import LateRules, moved
 from rds.grading.course.class_list import Member
+from rds.grading.criteria.criterion import GATE, in_steps
 from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.grading.review.entries import Entry, Kind
 
@@ -19,9 +20,9 @@ _DIGITS = 9
 def reviewed(grade: Grade, late: LateRules, member: Member | None, entries: Sequence[Entry]) -> Grade:
     """The grade that counts.
 
-    Points of graders replace those of a criterion: of each grader the last ones. Where graders differ, the mean counts
-    until a final word; `details["review"]["differ"]` names these criteria. Extensions move the due time, and late days
-    that the student has left are spent.
+    Points of graders replace those of a criterion: of each grader the last ones. Criteria that require it count as if
+    it had been measured so. Where graders differ, the mean counts until a final word; `details["review"]["differ"]`
+    names these criteria. Extensions move the due time, and late days that the student has left are spent.
     """
     if grade.status is Status.GRADER_ERROR:
         return grade
@@ -36,6 +37,8 @@ def reviewed(grade: Grade, late: LateRules, member: Member | None, entries: Sequ
         scores.append(_marked(score, of) if of else score)
         if _differ(of):
             differ.append(score.name)
+    given = {each.criterion for each in marks}
+    scores = [each if each.name in given else _behind_gates(each, scores, given) for each in scores]
     before = _rounded(grade.before_penalty + sum(s.score for s in scores) - sum(s.score for s in grade.criteria))
     extension = sum(each.value or 0.0 for each in entries if each.kind is Kind.EXTEND)
     extension += member.extension_days if member else 0.0
@@ -101,11 +104,41 @@ def _marked(score: CriterionScore, marks: Sequence[Entry]) -> CriterionScore:
     final = _decided(marks)
     counted = [final] if final is not None else list(_last_of_each(marks).values())
     points = _rounded(mean(each.value or 0.0 for each in counted))
-    band = Band.FULL if points >= score.max_score else Band.PARTIAL if points > 0.0 else Band.NONE
     # The value and the sentence of the measurement stay: what was measured is not a grader's to change. The student
     # reads it, so it names no grader; the trail in the class's page does.
-    said = f"{score.sentence} Set by hand to {points:g} points, from {score.score:g} as measured."
-    return replace(score, score=points, band=band, sentence=said.strip(), gate="")
+    said = (
+        f"{score.sentence} Set by hand to {points:g} of {score.max_score:g} points, from {score.score:g} as measured."
+    )
+    return replace(score, score=points, band=_band(points, score.max_score), sentence=said.strip(), gate="")
+
+
+def _behind_gates(score: CriterionScore, everybody: Sequence[CriterionScore], given: Set[str]) -> CriterionScore:
+    """A score that nobody has set, after points by hand for criteria that it requires.
+
+    They open it or take its points as measured ones do. What could not be measured waits for a grader all the same.
+    """
+    by_hand = {s.name: s for s in everybody if s.name in given and s.name in score.gates and s.max_score > 0.0}
+    if not by_hand or score.ungated is None or score.band is Band.REVIEW:
+        return score
+    gates = {**score.gates, **{name: min(s.score / s.max_score / GATE, 1.0) for name, s in by_hand.items()}}
+    now, before = min(gates.values()), min(score.gates.values())
+    share = now * score.ungated / score.max_score if score.max_score else 0.0
+    if now < 1.0 and not score.visible:
+        share = in_steps(share)
+    points = _rounded(share * score.max_score)
+    score = replace(score, gates=gates)
+    if now == before or points == score.score:
+        return score
+    titles = {each.name: each.title for each in everybody}
+    gate = titles[min(gates, key=lambda name: gates[name])] if now < 1.0 else ""
+    names = " and ".join(s.title for s in by_hand.values())
+    counts = f"{points:g} of {score.max_score:g} points count here, from {score.score:g} as measured"
+    said = f"{score.sentence} {names} was set by hand: {counts}."
+    return replace(score, score=points, band=_band(points, score.max_score), sentence=said, gate=gate)
+
+
+def _band(points: float, most: float) -> Band:
+    return Band.FULL if points >= most else Band.PARTIAL if points > 0.0 else Band.NONE
 
 
 def _rounded(points: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rds.grading.batch.finished import Finished
 from rds.grading.review.applied import of_review
-from rds.grading.review.entries import Kind
+from rds.grading.review.entries import Entry, Kind
 
 WAITING = ("student", "criterion", "what", "why")
 LOG = ("entry", "time", "by", "what", "about", "criterion", "value", "words")
@@ -22,6 +22,20 @@ def waiting(finished: Finished) -> list[list[str]]:
         for grade in finished.grades
         for name in of_review(grade).get("differ", ())
     ]
+
+
+def behind(finished: Finished, entry: Entry) -> list[str]:
+    """What else the points of an entry change: the criteria of its student that require the one that it is about."""
+    said = []
+    for grade in finished.grades:
+        if entry.kind is Kind.POINTS and entry.student in (grade.student, finished.of[grade.student]):
+            before = {score.name: score.score for score in finished.measured[finished.of[grade.student]].criteria}
+            said += [
+                f"{score.title} needs it: {score.score:g} points, from {before[score.name]:g} as measured"
+                for score in grade.criteria
+                if entry.criterion in score.gates and score.score != before[score.name]
+            ]
+    return said
 
 
 def log(finished: Finished) -> list[list[str]]:

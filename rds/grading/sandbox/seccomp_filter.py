@@ -20,7 +20,7 @@ _FILES = """
     mkdir mkdirat rmdir unlink unlinkat rename renameat renameat2 getdents getdents64 ftruncate truncate fallocate fsync
     fdatasync umask dup dup2 dup3 pipe pipe2 select pselect6 poll ppoll
 """
-_MEMORY = "munmap mprotect mremap madvise msync brk membarrier"
+_MEMORY = "munmap mprotect mremap msync brk membarrier"
 _PROCESSES = """
     rt_sigprocmask rt_sigreturn rt_sigpending rt_sigsuspend rt_sigtimedwait sigaltstack pause alarm
     setitimer getitimer kill tkill tgkill restart_syscall
@@ -52,7 +52,11 @@ _NEW_NAMESPACES = 0x7E020080  # all CLONE_NEW* bits: time, mount, cgroup, uts, i
 _ASKS = (0x5401, 0x541B, 0x5450, 0x5451)  # ioctl: TCGETS, FIONREAD, FIONCLEX, FIOCLEX
 _DUPLICATES = (0, 1, 2, 3, 1030)  # fcntl: duplicate, flags (F_SETFL is not here)
 # mmap: private memory, or a file's; shared memory without a file would be in no sum once it is out of sight (madvise)
-_MAPPINGS = ((0x0F, 0x02), (0x2F, 0x01))  # mask of its flags, and what they must be under it
+# and huge pages (MAP_HUGETLB) are in no process's resident size
+_MAPPINGS = ((0x4000F, 0x02), (0x4002F, 0x01))  # mask of its flags, and what they must be under it
+# madvise: what allocators and stacks use. Not MADV_MERGEABLE: pages that the kernel joins with those of others take
+# another time to write, by which others can be noticed
+_ADVICE = (*range(5), 8, *range(14, 20), 102, 103)
 _CHILD = 17  # SIGCHLD: who ignores it has children whose computing time the kernel adds to nobody's
 _SIGNAL_BITS = tuple(1 << k for k in range(7))  # of 1 to 64
 _NAMES_ITSELF = (15, 16)  # prctl: PR_SET_NAME, PR_GET_NAME
@@ -71,6 +75,8 @@ def submission_filter() -> bytes:
     calls.add_rule(seccomp.ALLOW, "clone", seccomp.Arg(0, seccomp.MASKED_EQ, _NEW_NAMESPACES, 0))
     for mask, flags in _MAPPINGS:
         calls.add_rule(seccomp.ALLOW, "mmap", seccomp.Arg(3, seccomp.MASKED_EQ, mask, flags))
+    for advice in _ADVICE:
+        calls.add_rule(seccomp.ALLOW, "madvise", seccomp.Arg(2, seccomp.EQ, advice))
     for number in _ASKS:
         calls.add_rule(seccomp.ALLOW, "ioctl", seccomp.Arg(1, seccomp.EQ, number))
     for number in _DUPLICATES:

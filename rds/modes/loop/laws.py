@@ -16,7 +16,7 @@ import numpy as np
 from rds.core.errors import ContractError
 from rds.core.signals import EXAMPLE, return_line, signal_values, signals_wanted
 from rds.core.types import Controller, Reference
-from rds.core.values import own_copy, shown
+from rds.core.values import is_masked, own_copy, shown
 from rds.machines.converter import as_voltage
 from rds.modes.loop.loop import Law
 
@@ -224,6 +224,8 @@ def _pair(answer: Any) -> Any:
 
 def _commands(u: Any, n: int) -> list[float]:
     """The `n` voltages of a coupled law, V; TypeError or ValueError for what is not that, such as texts."""
+    if is_masked(u):
+        raise TypeError
     array = np.asarray(u)
     if array.dtype.kind not in "fiu":
         raise TypeError
