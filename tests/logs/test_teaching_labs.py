@@ -101,3 +101,14 @@ def test_a_refusal_tells_what_of_a_mat_file_was_left_out(tmp_path: Path) -> None
     savemat(tmp_path / "log.mat", {"t": T, "runs": cells})
     with pytest.raises(InputError, match=r"left out.*runs"):
         read_log(tmp_path / "log.mat")
+
+
+def test_a_voltage_beside_a_commanded_torque_may_be_the_supply_s(tmp_path: Path) -> None:
+    """As a drive reports it: 36 V at its terminals, whatever it makes of them."""
+    columns = [T, U, V, 0.0 * T + 36.0]
+    with pytest.raises(InputError, match=r"torque cmd \[Nm\], voltage \[V\] could each be the command"):
+        read_log(written(tmp_path, "time [s],torque cmd [Nm],position [deg],voltage [V]", columns))
+    (axis,) = tomllib.loads(draft(read_table(tmp_path / "log.csv")))["axis"].values()
+    assert axis["command"]["column"] == "torque cmd"
+    (log,) = read_log(written(tmp_path, "time [s],torque cmd [Nm],position [deg],motor voltage [V]", columns))
+    assert log.units["command"] == "V"

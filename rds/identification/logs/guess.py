@@ -12,7 +12,15 @@ import numpy as np
 from rds.core.toml_text import toml_text
 from rds.identification.logs.map import SUFFIX, LogMap, TimeMap
 from rds.identification.logs.map_axis import DIMENSIONS, UNKNOWN, AxisMap, ColumnMap
-from rds.identification.logs.name_words import drives_nothing, is_never_measured, is_no_place, role, words_of
+from rds.identification.logs.name_words import (
+    drives_nothing,
+    is_at_the_motor,
+    is_commanded,
+    is_never_measured,
+    is_no_place,
+    role,
+    words_of,
+)
 from rds.identification.logs.table import Column, Table, remedy
 from rds.identification.logs.time_columns import RISING, are_alike, begins_anew, go_on_alike, is_coarse, is_even, rises
 from rds.identification.logs.units import dimension, factor, known_units
@@ -342,7 +350,10 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
     fits = [c for c in columns if dimension(c.unit or "") in dimensions]
     if quantity == "command":  # a voltage where there is one, else the torque or force of a drive, else its current
         fits = [c for c in fits if not drives_nothing(c.name)]
+        asked = [c for c in fits if is_commanded(c.name) and any(dimension(c.unit or "") in d for d in _ACTING)]
         fits = next((of for d in _ACTING if (of := [c for c in fits if dimension(c.unit or "") in d])), [])
+        if asked and not any(c in asked or is_at_the_motor(c.name) for c in fits):
+            fits = [*asked, *fits]  # a voltage beside a commanded torque may be that of the supply
     if quantity == "current":
         fits = [c for c in fits if not drives_nothing(c.name)]
     if quantity in ("position", "velocity"):
@@ -357,7 +368,9 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
         fits = places or fits
     named = [c for c in fits if role(c.name) == quantity]
     fits = named or fits
-    if quantity == "command" and len(fits) > 1:  # what acts, where the controller's unlimited answer is there too
+    if quantity == "command" and len({dimension(c.unit or "") for c in fits}) == 1 < len(
+        fits
+    ):  # what acts, where the controller's unlimited answer is there too
         acting = [c for c in fits if "voltage" in words_of(c.name)]
         fits = acting if len(acting) == 1 else fits
     return fits

@@ -56,6 +56,7 @@ _COMMANDS = _words(
 )
 _COMMANDED = {"command", "cmd"}
 _GOALS = _words("position pos angle velocity velo vel speed rpm")  # of which a command is where the axis is to go
+_AT_THE_MOTOR = _words("motor armature output applied control u vm phase motorspannung ankerspannung")
 # bounds, and lengths and angles that are no position; but what is corrected by them, or comes behind them, is one
 _BOUNDS = _words("limit limits limitation grenze maximum minimum max min")
 _NO_PLACES = _words(
@@ -93,6 +94,16 @@ def drives_nothing(name: str) -> bool:
     if _SUPPLIES & words or any(pair <= words for pair in _SUPPLY_PAIRS) or (_BOUNDS & words and not _BEHIND & words):
         return True
     return not _COMMANDS & words and bool(_NO_DRIVES & words or any(pair <= words for pair in _NO_DRIVE_PAIRS))
+
+
+def is_commanded(name: str) -> bool:
+    """Whether a name says that a controller commands it, as `torque cmd` does."""
+    return bool(_COMMANDS & words_of(name))
+
+
+def is_at_the_motor(name: str) -> bool:
+    """Whether a voltage of this name is surely the motor's, and not that of a drive's supply."""
+    return bool(_AT_THE_MOTOR & words_of(name))
 
 
 def is_no_place(name: str) -> bool:
