@@ -368,9 +368,8 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
         fits = places or fits
     named = [c for c in fits if role(c.name) == quantity]
     fits = named or fits
-    if quantity == "command" and len({dimension(c.unit or "") for c in fits}) == 1 < len(
-        fits
-    ):  # what acts, where the controller's unlimited answer is there too
+    # what acts, where the controller's unlimited answer is there too
+    if quantity == "command" and len(fits) > 1 and all(dimension(c.unit or "") == "voltage" for c in fits):
         acting = [c for c in fits if "voltage" in words_of(c.name)]
         fits = acting if len(acting) == 1 else fits
     return fits
