@@ -112,3 +112,16 @@ def test_a_voltage_beside_a_commanded_torque_may_be_the_supply_s(tmp_path: Path)
     assert axis["command"]["column"] == "torque cmd"
     (log,) = read_log(written(tmp_path, "time [s],torque cmd [Nm],position [deg],motor voltage [V]", columns))
     assert log.units["command"] == "V"
+
+
+def test_a_position_that_may_be_in_metres_leaves_another_in_doubt(tmp_path: Path) -> None:
+    """Of a cart with a pendulum: `_m` may be metres or `measured`, and the angle is not where the cart is."""
+    with pytest.raises(InputError, match=r"pendulum_angle_rad \[rad\], cart_position_m could each be the position"):
+        read_log(written(tmp_path, "time_s,cart_position_m,pendulum_angle_rad,motor_voltage_V", [T, V, U, U]))
+
+
+def test_names_of_robots_joints_tell_what_is_desired_and_what_drives(tmp_path: Path) -> None:
+    (log,) = read_log(written(tmp_path, "t [s],q_des [rad],q [rad],dq [rad/s],tau [Nm]", [T, U + 1.0, U, V, V]))
+    assert np.allclose(log.position, np.degrees(U), atol=1e-3) and log.units["command"] == "Nm"
+    (log,) = read_log(written(tmp_path, "time_s,position_rad,control_torque_nm", [T, U, V]))
+    assert log.units["command"] == "Nm" and np.allclose(log.command, V, atol=1e-5)

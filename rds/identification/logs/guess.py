@@ -27,6 +27,7 @@ from rds.identification.logs.units import dimension, factor, known_units
 
 _ACTING = (("voltage",), ("force", "torque"), ("current",))
 _NO_LOG = "it is no log over time"
+_IN_METRES = re.compile(r"(.+_)?(pos|position|distance|displacement)_m")  # or a measured position
 _TOLD = 5  # columns that a sentence names
 _ORDINALS = ("reading", "iteration", "move", "index", "n", "count", "sample")
 
@@ -291,8 +292,10 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
                 told = " or ".join(f"{c.name} [{c.unit}]" for c in parts[:_TOLD])
                 doubt += f"; where {told} is the command, say so in a map"
             return {}, doubt + (f" (no unit: {', '.join(bare[:_TOLD])})" if bare else "")
+        if quantity == "position":
+            fits = [*fits, *(c for c in measured if c.unit is None and _IN_METRES.fullmatch(c.name.lower()))]
         if len(fits) > 1:
-            names = ", ".join(f"{c.name} [{c.unit}]" for c in fits)
+            names = ", ".join(c.name + (f" [{c.unit}]" if c.unit else "") for c in fits)
             are_speeds = all(dimension(c.unit or "") == "angular speed" for c in fits)
             return {}, f"{names} could each be the {'speed' if are_speeds else quantity}"
         found[quantity] = fits[0]

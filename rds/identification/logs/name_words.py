@@ -19,11 +19,11 @@ _ACTS = _DRIVING | _VOLTAGES | {"current", "strom", "motorstrom", "ankerstrom"}
 _WORDS: Mapping[str, frozenset[str]] = {
     "time": _words("time t zeit timestamp timestamps elapsed seconds zeitstempel tempo tiempo"),
     "reference": _words(
-        "reference ref setpoint sp set desired target commanded soll demand qg sollposition lagesollwert solldrehzahl "
-        "sollgeschwindigkeit drehzahlsollwert referencia consigna consigne riferimento"
+        "reference ref setpoint sp set des desired target commanded soll demand qg sollposition lagesollwert "
+        "solldrehzahl sollgeschwindigkeit drehzahlsollwert referencia consigna consigne riferimento"
     ),
     "velocity": _words(
-        "velocity velo vel speed rpm v rate omega geschwindigkeit drehzahl istdrehzahl istgeschwindigkeit "
+        "velocity velo vel speed rpm v rate omega dq geschwindigkeit drehzahl istdrehzahl istgeschwindigkeit "
         "drehzahlistwert velocidade velocidad vitesse velocita"
     ),
     "current": _CURRENTS,

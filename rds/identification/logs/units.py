@@ -97,6 +97,7 @@ _ENDINGS = (
     "percent",
 )
 _OF_RPM = re.compile(r"(?:.*[_ ])?rpm(?:[_ ]?\w+)?|(?:.*[_ ])?RPM(?:[_ ]?\w+)?")
+_OF_TORQUE = re.compile(r"(?:.*_)?(?:torque|tau)_(?:.*_)?nm")  # of which nm is no length
 _RATES = re.compile(r"(?P<stem>.+?)_(?P<unit>mm|um|m|cm|in|deg|rad|rev|counts|inc)_(?:p|per)?_?(?P<time>s|sec|min)")
 
 
@@ -104,6 +105,8 @@ def unit_of_name(name: str) -> str | None:
     """The unit that a name ends with, as `pos_mm` and `velocity_mm_s` do; `rpm_left` has one, too. None for none."""
     if _OF_RPM.fullmatch(name):
         return "rev/min"
+    if _OF_TORQUE.fullmatch(name):
+        return "Nm"
     if rate := _RATES.fullmatch(name):
         unit = f"{rate['unit']}/{'s' if rate['time'] == 'sec' else rate['time']}"
         return unit if dimension(unit) else None
