@@ -125,3 +125,8 @@ def test_names_of_robots_joints_tell_what_is_desired_and_what_drives(tmp_path: P
     assert np.allclose(log.position, np.degrees(U), atol=1e-3) and log.units["command"] == "Nm"
     (log,) = read_log(written(tmp_path, "time_s,position_rad,control_torque_nm", [T, U, V]))
     assert log.units["command"] == "Nm" and np.allclose(log.command, V, atol=1e-5)
+
+
+def test_hertz_of_a_speed_are_told_what_they_may_be(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="revolutions in a second are 'rev/s', where they are the axis's and no elect"):
+        read_log(written(tmp_path, "time [s],voltage [V],velocity [Hz]", [T, U, V]))

@@ -155,6 +155,8 @@ def known_units(unit: str, dimensions: Iterable[str]) -> str:
     spelled |= {name.casefold(): name for name in known}
     close = get_close_matches(plain(unit).casefold(), spelled, n=1, cutoff=_ALIKE)
     hint = f"; did you mean {spelled[close[0]]!r}?" if close else ""
+    if unit == "Hz" and "rev/s" in known:
+        hint = "; revolutions in a second are 'rev/s', where they are the axis's and no electrical ones"
     return f"known units: {', '.join(known)}{hint}"
 
 
