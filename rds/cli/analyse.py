@@ -198,17 +198,24 @@ def _analyse_table(
 
         draw(plot, analysis, found)
     if json:
-        told = {"without_period": table.without_period} | ({"measured": found.to_json()} if found else {})
+        told: dict[str, object] = {"without_period": table.without_period, "transported": [*table.transported]}
+        told |= {"measured": found.to_json()} if found else {}
         print_json(analysis.to_json() | told)
     else:
         _show(analysis, found, trace)
         if plot is not None:
             typer.echo(f"plot: {plot}")
-    if table.without_period:
-        names = ", ".join(table.without_period[:6]) + (", ..." if len(table.without_period) > 6 else "")
-        typer.echo(
-            f"rds: {len(table.without_period)} of {len(table.without_period) + len(table.messages)} messages have no "
-            f"period in the file and are left out: {names}; --sample-period gives them one",
-            err=True,
-        )
+    count = len(table.messages) + len(table.without_period) + len(table.transported)
+    for left_out, what, cure in (
+        (table.without_period, "no period in the file", "--sample-period gives them one"),
+        (
+            table.transported,
+            "more than 8 bytes, and nothing says that they are CAN FD,",
+            "the frames of the transport protocol (J1939, ISO-TP) that carry them come on top of this load",
+        ),
+    ):
+        if left_out:
+            names = ", ".join(left_out[:6]) + (", ..." if len(left_out) > 6 else "")
+            said = f"{len(left_out)} of {count} messages have {what} and are left out: {names}; {cure}"
+            typer.echo(f"rds: {said}", err=True)
     raise typer.Exit(0 if analysis.met and (found is None or found.met) else 1)

@@ -42,15 +42,15 @@ def describe(
         written = []
         if write_map:
             written.append(_write_map(file))
-            typer.echo(f"rds: wrote {written[0]}, a draft: check every line of it", err=True)
+            typer.echo(f"rds: wrote {written[0]}, a draft: check every line of it{_to_fill_in(written[0])}", err=True)
         with progress_bars() as bar:
-            found = described(file, map_, bar(f"read {file.name}"))
+            found = described(file, map_, bar(f"read {file.name}"), find_map=not write_map)
         if plot is not None:
             written += _save_plot(found, plot)
     if json:
         print_json(found.to_json() | {"files": [str(path) for path in written]})
     else:
-        _show(found)
+        _show(found, draft=not write_map)
         for path in written:
             typer.echo(f"wrote {path}")
     raise typer.Exit(0 if found.usable else 1)
@@ -125,6 +125,18 @@ def _write_map(file: Path) -> Path:
     return path
 
 
+def _to_fill_in(path: Path) -> str:
+    """Where a draft has marks for what the file does not tell; "" for none."""
+    from rds.core.errors import InputError
+    from rds.identification.logs.map import LogMap
+
+    try:
+        LogMap.read(path)
+    except InputError as error:
+        return f". In {str(error).removeprefix(f'{path}, ')}"
+    return ""
+
+
 def _save_plot(found: Description, path: Path) -> list[Path]:
     """The overview as a picture; none where there is no log to show."""
     from rds.core.atomic import write_whole
@@ -136,7 +148,7 @@ def _save_plot(found: Description, path: Path) -> list[Path]:
     return [write_whole(path, overview(found.logs).png())]
 
 
-def _show(found: Description) -> None:
+def _show(found: Description, draft: bool) -> None:
     from rds.cli.console import show_table
     from rds.results.units import heading
 
@@ -166,6 +178,6 @@ def _show(found: Description) -> None:
         typer.echo(said)
     for finding in found.findings:
         typer.echo(f"{finding.gravity}: {finding.what} [{finding.kind}]")
-    if found.draft:
+    if found.draft and draft:
         place = f"{found.path.name}.map.toml"
         typer.echo(f"\nA draft of {place}, to be corrected (--write-map writes it):\n\n{found.draft}")

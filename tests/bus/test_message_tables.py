@@ -50,6 +50,27 @@ def test_a_dbc_file_is_analysed_and_messages_without_a_period_are_named(tmp_path
     assert "OnChange" in done.stderr
 
 
+def test_a_message_of_a_transport_protocol_is_left_out_and_named(tmp_path: Path) -> None:
+    """J1939's DM1 of 20 bytes has no frame of its own; the others of the file are analysed as without it."""
+    long = 'BO_ 2566834709 Faults: 20 Gateway\n SG_ Lamp : 0|8@1+ (1,0) [0|255] "" Gateway\n\n'
+    (tmp_path / "car.dbc").write_text(DBC)
+    (tmp_path / "truck.dbc").write_text(DBC.replace("BO_ 256 ", f"{long}BO_ 256 ", 1))
+    car, truck = (
+        CliRunner().invoke(app, ["bus", "analyse", str(tmp_path / name), "--json"], catch_exceptions=False)
+        for name in ("car.dbc", "truck.dbc")
+    )
+    assert truck.exit_code == 0 and "more than 8 bytes" in truck.stderr and "Faults" in truck.stderr
+    found = json.loads(truck.stdout)
+    assert found["transported"] == ["Faults"] and found["messages"] == json.loads(car.stdout)["messages"]
+
+
+def test_a_file_of_transported_messages_alone_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "truck.dbc"
+    path.write_text('VERSION ""\nBU_: Gateway\nBO_ 2566834709 Faults: 20 Gateway\n')
+    with pytest.raises(InputError, match=r"Faults has more than 8 bytes, .* VFrameFormat"):
+        read_messages(path, 0.1)
+
+
 def test_a_can_fd_message_switches_the_bit_rate_unless_the_file_says_no(tmp_path: Path) -> None:
     formats = ",".join(f'"{name}"' for name in ("StandardCAN", "ExtendedCAN", *["reserved"] * 12, "StandardCAN_FD"))
     fd = f"""{DBC}BA_DEF_ BO_ "VFrameFormat" ENUM {formats};

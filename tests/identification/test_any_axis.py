@@ -316,6 +316,18 @@ def test_the_right_inertia_is_valid_on_another_log(output: str) -> None:
     assert float(gain.split("its gain is ")[1].split()[0]) < 3.0
 
 
+def test_gaps_that_are_kept_leave_the_inertia_to_simulation() -> None:
+    """A recorder on a computer pauses for 8 ms now and then; derivatives do not know the motion there."""
+    log = turning(1, "rev/min")
+    keep = np.flatnonzero(np.arange(len(log)) % 400 < 392)
+    broken = replace(log, time=log.time[keep], command=log.command[keep], position=log.position[keep])
+    with pytest.raises(InputError, match="no filter bridges; `--method simulation` simulates across it"):
+        fit(broken, structure("axis-inertia"), "inverse-dynamics")
+    found = fit(broken, structure("axis-inertia"), "simulation").parameters
+    for name in ("J", "B", "T_c"):
+        assert found[name].value == pytest.approx(TURNS[name], rel=0.03), name
+
+
 def test_inverse_dynamics_of_a_held_torque_is_not_biased() -> None:
     """A torque is held from its sample to the next: taken as it is at its sample, parameters are five errors off."""
     found = fit(turning(1, "rev/min"), structure("axis-inertia"), "inverse-dynamics").parameters

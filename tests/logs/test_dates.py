@@ -127,3 +127,70 @@ def test_a_time_of_day_before_a_comma_keeps_its_neighbour(tmp_path: Path) -> Non
     assert read_log(path)[0].command[3] == 3.0
     path.write_text("time,voltage [V],position [mm]\n" + "".join(f"12:00:{k:02d},{k % 7},{k}\n" for k in range(60)))
     assert read_log(path)[0].command[3] == 3.0 and read_log(path)[0].sample_period == pytest.approx(1.0)
+
+
+def clock(at: datetime, hours: str = "%H") -> str:
+    """A time of day with its milliseconds; %I for half a day."""
+    return at.strftime(f"{hours}:%M:%S.") + f"{at.microsecond // 1000:03d}"
+
+
+FORMS = {
+    "a colon before milliseconds": lambda at: clock(at).replace(".", ":"),
+    "a date and a colon before milliseconds": lambda at: f"2024-03-01 {clock(at)}".replace(".", ":"),
+    "halves of a day": lambda at: f"{clock(at, '%I').lstrip('0')} {at:%p}",
+    "halves of a day, small": lambda at: clock(at, "%I") + at.strftime("%p").lower(),
+    "no zero before the hour": lambda at: clock(at).lstrip("0"),
+    "MATLAB": lambda at: f"01-Mar-2024 {clock(at)}",
+    "the day before the month's name": lambda at: f"1 March 2024 {clock(at)}",
+    "the month's name first": lambda at: f"Mar 1 2024 {clock(at)}",
+    "a comma before the year": lambda at: f'"March 1, 2024 {clock(at)}"',
+    "no zeros, the year first": lambda at: f"2024/3/1 {clock(at)}",
+    "no zeros, the day first": lambda at: f"1.3.2024 {clock(at)}",
+    "a point between date and time": lambda at: f"2024-03-01.{clock(at)}",
+    "the day or the month first": lambda at: f"3/1/2024 {clock(at, '%I')} {at:%p}",
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("hour", [9, 11, 23])
+@pytest.mark.parametrize("mark", [",", ";"])
+def test_dates_and_times_that_can_mean_one_thing_are_read(tmp_path: Path, form: str, hour: int, mark: str) -> None:
+    begin, path = datetime(2024, 3, 1, hour, 59, 59, 900000), tmp_path / "log.csv"
+    samples = 100 if hour == 23 else 300  # the day is the same in all rows
+    rows = (mark.join((FORMS[form](begin + timedelta(milliseconds=k)), f"{k % 7}", f"{k}.25")) for k in range(samples))
+    path.write_text(f"time{mark}voltage [V]{mark}position [mm]\n" + "\n".join(rows) + "\n")
+    (log,) = read_log(path)
+    assert np.allclose(log.time, 1e-3 * np.arange(samples), atol=1e-9) and log.position[3] == 3.25
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        ("11:59:59:90", "11:59:59:91"),  # frames of a film, or hundredths
+        ("13:59:59.900 PM", "13:59:59.901 PM"),
+        ("31/12/2024 11:59:59.900", "31/12/2024 11:59:59.901"),
+        ("03/04/2024 23:59:59.999", "04/04/2024 00:00:00.000"),  # a day later, or a month
+    ],
+)
+def test_dates_and_times_that_can_mean_two_things_are_refused(tmp_path: Path, stamps: tuple[str, str]) -> None:
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{stamp},{k},{k}\n" for k, stamp in enumerate(stamps))
+    path.write_text(f"time,voltage [V],position [mm]\n{rows}")
+    with pytest.raises(InputError, match=r"write (dates|times of day) as"):
+        read_log(path)
+
+
+def test_an_american_log_goes_on_through_midnight(tmp_path: Path) -> None:
+    begin, path = datetime(2024, 3, 1, 23, 59, 59, 900000), tmp_path / "log.csv"
+    stamps = [begin + timedelta(milliseconds=k) for k in range(300)]
+    rows = "".join(f"{at:%m/%d/%Y} {clock(at)},{k % 7},{k}\n" for k, at in enumerate(stamps))
+    path.write_text(f"time,voltage [V],position [mm]\n{rows}")
+    assert np.allclose(read_log(path)[0].time, 1e-3 * np.arange(300), atol=1e-9)
+
+
+def test_the_exponents_of_fortran_are_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = (f"{1e-3 * k:.9E},{k % 7:.3E},{1.5 * k:.6E}".replace("E", "D") for k in range(300))
+    path.write_text("time [s],voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    (log,) = read_log(path)
+    assert np.allclose(log.time, 1e-3 * np.arange(300)) and np.array_equal(log.position, 1.5 * np.arange(300))

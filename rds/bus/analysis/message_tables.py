@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,14 +27,16 @@ _YES, _NO = ("1", "yes", "true", "x"), ("", "0", "no", "false")
 _HIGHEST_STANDARD = 0x7FF
 _SWITCH = "CANFD_BRS"
 _OFF = ("0", "no", "off", "false")
+_LONGEST = 8  # bytes that a classic frame carries
 _NO_MESSAGE = "VECTOR__INDEPENDENT_SIG_MSG"  # where Vector's editor keeps signals of no message
 
 
 class MessageTable(NamedTuple):
-    """Messages of a file, and the names of those that it gives no period."""
+    """Messages of a file, and the names of those that are left out: it gives no period, or no frame carries them."""
 
     messages: list[Message]
     without_period: list[str]
+    transported: Sequence[str] = ()  # of more than 8 bytes, and not CAN FD: J1939's or ISO's transport protocol
 
 
 def is_message_table(path: Path) -> bool:
@@ -53,8 +55,12 @@ def read_messages(path: Path, period: float | None = None) -> MessageTable:
     if not path.is_file():
         raise InputError("there is no such file; check the name", str(path))
     found = _of_dbc(path, period) if path.suffix.lower() == ".dbc" else _of_csv(path, period)
-    if not found.messages and not found.without_period:
+    if not found.messages and not found.without_period and not found.transported:
         raise InputError("there are no messages in it; name a table of messages", str(path))
+    if not found.messages and found.transported and not found.without_period:
+        what = f"{found.transported[0]} has more than 8 bytes, and so have all messages of the file: one classic frame"
+        cure = "if they are CAN FD, say so by the attribute VFrameFormat; else name the frames that carry them"
+        raise InputError(f"{what} carries none of them; {cure}", str(path))
     if not found.messages:
         raise InputError("no message of the file has a period; give one for all by --sample-period, in s", str(path))
     return found
@@ -66,9 +72,13 @@ def _of_dbc(path: Path, period: float | None) -> MessageTable:
 
     messages: list[Message] = []
     silent: list[str] = []
+    transported: list[str] = []
     database = load_dbc(path)
     for entry in database.messages:
         if entry.name == _NO_MESSAGE:
+            continue
+        if entry.length > _LONGEST and not entry.is_fd:
+            transported.append(entry.name)
             continue
         its_period = entry.cycle_time * 1e-3 if entry.cycle_time else period
         if its_period is None:
@@ -86,7 +96,7 @@ def _of_dbc(path: Path, period: float | None) -> MessageTable:
                 bitrate_switch=entry.is_fd and _switches_rate(entry, database),
             )
         )
-    return MessageTable(messages, silent)
+    return MessageTable(messages, silent, transported)
 
 
 def _switches_rate(entry: Any, database: Any) -> bool:

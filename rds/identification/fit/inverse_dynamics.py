@@ -132,8 +132,10 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     )
 
 
-def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> RegressionResult:
-    """The regression alone, over all logs together."""
+def regress_logs(
+    logs: Sequence[Log], structure: Structure, options: Mapping[str, Any], bridged: float = _BRIDGED
+) -> RegressionResult:
+    """The regression alone, over all logs together. `bridged`: the longest step of the time, in sample periods."""
     form = motion_form(structure)
     fixed = _fixed(options.get(FIXED) or {}, form, structure)
     stepped = tuple(log.name for log in logs if irregular_at(log) is not None)
@@ -141,7 +143,7 @@ def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str
     gain = next(iter(structure.given(logs).values())) if structure.given else 1.0
     blocks, still = [], 0
     for log in logs:
-        rows, at_rest = _rows(log, form, settings, gain)
+        rows, at_rest = _rows(log, form, settings, gain, bridged)
         blocks.append(rows[~at_rest])
         still += int(at_rest.sum())
     table = np.vstack(blocks)
@@ -230,11 +232,11 @@ def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, A
     )
 
 
-def _regular(log: Log, is_held: bool) -> Log:
+def _regular(log: Log, is_held: bool, bridged: float) -> Log:
     """The log itself, or at equal steps, the mean ones, where its times are not: the position by a cubic spline.
 
     Of a held command each step gets its mean, since a change falls between two steps; another one is taken on straight
-    lines. InputError for a gap: no spline knows the motion in it.
+    lines. InputError for a step of more than `bridged` periods: no spline knows the motion in such a gap.
     """
     if irregular_at(log) is None:
         return log
@@ -242,11 +244,12 @@ def _regular(log: Log, is_held: bool) -> Log:
         from scipy.interpolate import CubicSpline
 
     steps = np.diff(log.time) / log.sample_period
-    if steps.max() > _BRIDGED:
-        at = int(np.argmax(steps > _BRIDGED))
+    if steps.max() > bridged:
+        at = int(np.argmax(steps > bridged))
         raise InputError(
             f"{steps[at]:.3g} sample periods are between {log.time[at]:g} and {log.time[at + 1]:g} s, a gap that no "
-            'filter bridges; gaps = "split" in the map makes a log of each stretch (in Python: log.part(first, end))',
+            "filter bridges; `--method simulation` simulates across it with the command held, or "
+            'gaps = "split" in the map makes a log of each stretch (in Python: log.part(first, end))',
             log.source or log.name,
         )
     grid = np.linspace(log.time[0], log.time[-1], len(log))
@@ -259,12 +262,14 @@ def _regular(log: Log, is_held: bool) -> Log:
     return replace(log, time=grid, command=command, position=CubicSpline(time, position)(grid), extra={})
 
 
-def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[np.ndarray, np.ndarray]:
+def _rows(
+    log: Log, form: MotionForm, settings: Settings, gain: float, bridged: float = _BRIDGED
+) -> tuple[np.ndarray, np.ndarray]:
     """The target and the columns of one log, decimated, (rows, 1 + coefficients); and which rows are at rest."""
     with needed_for("a fit by inverse dynamics"):
         from scipy.signal import butter, decimate, filtfilt
 
-    log = _regular(log, settings.hold > 0.0)
+    log = _regular(log, settings.hold > 0.0, bridged)
     T = log.sample_period
     least = 2 * settings.drop + 4 * settings.decimation * len(form.names)
     if len(log) < max(least, 40):

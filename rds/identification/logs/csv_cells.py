@@ -20,14 +20,11 @@ BLANKS = frozenset(
         *("-1.#ind", "1.#qnan", "1.#inf", "-1.#inf", "-nan(ind)", "nan(ind)"),  # of C on Windows
     )
 )
-DATE = re.compile(
-    r"(\d{4}-\d\d-\d\d|\d{4}/\d\d/\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?"
-)
-CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")  # a time of day
 # before each line that a terminal shows: `16:20:01.123 -> ` of the Arduino IDE, `[2024-01-01 16:20:01.123] ` of others
 _DAY = r"(?:\d{4}-\d\d-\d\d[ T]|\w{3} \w{3} [ \d]\d )?"
 _STAMP = re.compile(rf"\[?{_DAY}\d\d:\d\d:\d\d(?:[.,]\d+)?(?: \d{{4}})?\]?\s*(?:->|>)?\s+")
 _WITH_UNIT = re.compile(r"(?!0[xX])[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?\s*([^\W\d_]|[°%]){1,4}(/[^\W\d_]{1,3})?")
+_FORTRAN = re.compile(r"[+-]?\d+\.\d*[dD][+-]\d{2,3}")
 _BLOCK = 1 << 22  # bytes
 
 
@@ -67,7 +64,8 @@ def is_number(cell: str, decimal: str) -> bool:
     try:
         float(cell)
     except ValueError:
-        return False
+        if not _FORTRAN.fullmatch(cell):
+            return False
     return cell.lower() not in BLANKS and "_" not in cell and cell.isascii()  # Arrow knows no digits of other scripts
 
 

@@ -17,8 +17,6 @@ from pathlib import Path
 from rds.core.errors import InputError
 from rds.identification.logs.csv_cells import (
     BLANKS,
-    CLOCK,
-    DATE,
     DELIMITERS,
     are_numbers,
     has_unit,
@@ -37,6 +35,7 @@ from rds.identification.logs.csv_headings import (
     labelled_headings,
     of_rigol,
 )
+from rds.identification.logs.csv_stamps import CLOCK, DATE, is_american, is_stamp, uniform_cell
 
 HEAD = 1 << 16  # bytes looked at
 _SETTINGS = 40  # lines beside which an oscilloscope says how it was set
@@ -69,6 +68,7 @@ class Layout:
     torn: tuple[str, ...] = ()  # of columns for which the heading and the row of units say different units
     beside: int = 0  # columns at the left that hold the recorder's settings beside the samples
     surplus: tuple[str, ...] = ()  # headings below which no cells stand
+    american: frozenset[int] = frozenset()  # dates of which nothing tells whether the day or the month is first
     short: str = ""  # a line above the data that has fewer cells than the rows, where no other line names the columns
 
 
@@ -139,8 +139,9 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         what = f"a terminal's time stamp stands before each line ({stamp!r}), and its first column cannot be read; "
         cut = f"cut {len(stamp)} characters off: `cut -c{len(stamp) + 1}- FILE > log.csv`"
         raise InputError(f"{what}switch the stamps off there, or {cut}", str(path))
-    stamps = {i: found for i in range(width) for row in body[:1] if (found := DATE.fullmatch(row[i]))}
-    clocks = frozenset(i for i in range(width) for row in body[:1] if CLOCK.fullmatch(row[i]))
+    top = [uniform_cell(cell) for row in body[:1] for cell in row]
+    stamps = {i: found for i, cell in enumerate(top) if (found := DATE.fullmatch(cell))}
+    clocks = frozenset(i for i, cell in enumerate(top) if CLOCK.fullmatch(cell))
     dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()} | dict.fromkeys(clocks, False)
     words = frozenset(
         i
@@ -183,6 +184,7 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         scaled,
         torn,
         surplus=surplus,
+        american=frozenset(i for i in stamps if is_american(body[0][i])),
         short=_short_heading(lines[:first], mark, point, names),
     )
 
@@ -273,7 +275,7 @@ def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int,
     for number, line in enumerate(lines):
         if line.strip() and not is_comment(line):
             cells = split(line, delimiter)
-            kinds = [is_number(cell, decimal) or bool(DATE.fullmatch(cell) or CLOCK.fullmatch(cell)) for cell in cells]
+            kinds = [is_number(cell, decimal) or is_stamp(cell) for cell in cells]
             blanks = sum(cell.lower() in BLANKS for cell in cells)
             if delimiter in ", " and _OTHER_MARK.search(line):
                 continue

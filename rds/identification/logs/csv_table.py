@@ -21,17 +21,15 @@ from rds.core.extras import needed_for
 from rds.core.limits import LINE, lifted, refusal
 from rds.core.progress import Progress
 from rds.identification.logs.csv_cells import BLANKS, is_number, split
-from rds.identification.logs.csv_layout import Layout, in_rows, sniff
+from rds.identification.logs.csv_layout import HEAD, Layout, in_rows, sniff
+from rds.identification.logs.csv_stamps import rules, uniform
 from rds.identification.logs.log import Finding, Gravity
-from rds.identification.logs.table import Column, Table, since_first
+from rds.identification.logs.table import DATE_REMEDY, Column, Table, since_first
 from rds.identification.logs.units import factor, unit_of_name
 
 _BLOCK = 1 << 22  # bytes
 _TAIL = 1 << 14  # bytes at the end in which a cut is looked for
 _REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")
-_DOTTED_DATE = re.compile(rb"(?<![\d.])(\d\d)\.(\d\d)\.(\d{4})[T ](?=\d\d:\d\d)")  # the day is first, always
-_SLASHED_DATE = re.compile(rb"(?<![\d/])(\d{4})/(\d\d)/(\d\d)(?=[T ]\d\d:\d\d)")  # of Japanese controls
-_COMMA_TIME = re.compile(rb"(?<!\d)(\d\d:\d\d:\d\d),(\d)")
 _SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 _DAY = 86400.0  # s
 _WIDE, _TIMES_WIDER = 100, 10  # columns from which, and rows of which, a table lies on its side
@@ -269,6 +267,11 @@ def _read(
     for i in list(values):
         column = np.concatenate(values.pop(i) or [np.empty(0, dtype="datetime64[ns]" if i in dates else np.float64)])
         joined[i] = since_first(column) if i in dates else column
+        if i in layout.american and np.ptp(joined[i][np.isfinite(joined[i])]) > 2.0 * _DAY:
+            what = (
+                f"{layout.names[i]!r} holds dates of several days, of which nobody knows whether the day or the month "
+            )
+            raise InputError(f"{what}is first; {DATE_REMEDY}", str(path))
         if i in layout.clocks:
             joined[i] = _through_midnight(joined[i])
     return joined, {i: texts.get(i, (0, "")) for i in words}, stream.remarks
@@ -284,7 +287,7 @@ class _Rows:
         self._delimiter, self._width = layout.delimiter.encode(), len(layout.names) if layout.ragged else 0
         for _ in range(layout.first):
             self._file.readline()  # within what the layout was found in
-        self._stamped = bool(layout.dates)
+        self._rules: Sequence[Any] | None = None  # by which dates and exponents are turned, once the first are seen
         self.remarks, self.closed = 0, False
 
     @property
@@ -302,10 +305,9 @@ class _Rows:
             data += self._rest_of_line()
             data, remarks = _REMARK.subn(b"", data)
             self.remarks += remarks
-            if self._stamped:  # as Germans and Python's logging write them
-                data = _SLASHED_DATE.sub(rb"\1-\2-\3", data)
-                data = _DOTTED_DATE.sub(rb"\3-\2-\1 ", data)
-                data = data if self._delimiter == b"," else _COMMA_TIME.sub(rb"\1.\2", data)
+            if self._rules is None:
+                self._rules = rules(data[:HEAD], self._delimiter.decode())
+            data = uniform(data, self._rules)
             if self._spaces:
                 data = re.sub(rb"[ \t]+", b" ", _SPACES.sub(b"", data))
             if self._width:

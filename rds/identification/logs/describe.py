@@ -73,14 +73,15 @@ def describe(
     path: str | Path,
     mapping: LogMap | str | Path | None = None,
     progress: Progress | None = None,
+    find_map: bool = True,
 ) -> Description:
-    """Describe a file, with or without a map.
+    """Describe a file, with or without a map; `find_map` looks for one beside it.
 
     InputError for a file or map that cannot be read. Data that make no log (a doubtful meaning, a time that goes back,
     blanks) are a finding: the columns are described all the same.
     """
     path = Path(path)
-    chosen = choose_map(path, mapping)
+    chosen = choose_map(path, mapping) if find_map or mapping is not None else None
     if chosen is None and is_own(path):
         logs = own_logs(path)
         return Description(

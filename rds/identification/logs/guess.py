@@ -12,13 +12,22 @@ import numpy as np
 from rds.core.toml_text import toml_text
 from rds.identification.logs.map import SUFFIX, LogMap, TimeMap
 from rds.identification.logs.map_axis import DIMENSIONS, UNKNOWN, AxisMap, ColumnMap
-from rds.identification.logs.name_words import drives_nothing, is_never_measured, is_no_place, role, words_of
+from rds.identification.logs.name_words import (
+    drives_nothing,
+    is_at_the_motor,
+    is_commanded,
+    is_never_measured,
+    is_no_place,
+    role,
+    words_of,
+)
 from rds.identification.logs.table import Column, Table, remedy
+from rds.identification.logs.time_columns import RISING, are_alike, begins_anew, go_on_alike, is_coarse, is_even, rises
 from rds.identification.logs.units import dimension, factor, known_units
 
 _ACTING = (("voltage",), ("force", "torque"), ("current",))
-_RISING = 0.9  # of the steps of a time go up
 _NO_LOG = "it is no log over time"
+_IN_METRES = re.compile(r"(.+_)?(pos|position|distance|displacement)_m")  # or a measured position
 _TOLD = 5  # columns that a sentence names
 _ORDINALS = ("reading", "iteration", "move", "index", "n", "count", "sample")
 
@@ -77,7 +86,7 @@ def draft(table: Table) -> str:
     columns = [c for c in table.columns.values() if c.text is None]
     named = next((c.name for c in columns if role(c.name) == "time"), None)
     if named is None and not any(c.unit or role(c.name) for c in columns):
-        named = next((c.name for c in columns if _rises(c.values)), None)
+        named = next((c.name for c in columns if rises(c.values)), None)
     elif named is None and len(offered := _perhaps_times(columns)) == 1:
         named = offered[0]  # as dSPACE's X
     if not table.own_times:
@@ -142,11 +151,14 @@ def _time(table: Table) -> tuple[str | None, str]:
         return None, ""
     columns = [c for c in table.columns.values() if c.text is None]
     in_time = [c for c in columns if dimension(c.unit or "") == "time"]
-    rising = [c for c in in_time if _rises(c.values)]
+    rising = [c for c in in_time if rises(c.values)]
     named = [c for c in rising if role(c.name) == "time"]
     for found in (rising, named):
-        if found and all(_are_alike(c, found[0]) for c in found):
+        if found and all(are_alike(c, found[0]) for c in found):
             return found[0].name, ""  # one alone, or the same in several columns
+    for found in (rising, named):
+        if found and all(go_on_alike(c, found[0]) for c in found):
+            return found[0].name, ""  # a date beside the time since the start
     if rising:
         return None, f"{', '.join(c.name for c in rising)} could each be the time; say which in a map"
     named = [c for c in columns if role(c.name) == "time"]
@@ -173,9 +185,9 @@ def _spoiled(table: Table, quantity: str) -> str:
 def _why_no_time(column: Column) -> str:
     """What a column that is called a time does in its place, and what to do."""
     rows, steps = len(column.values), np.diff(column.values[np.isfinite(column.values)])
-    if len(steps) and np.mean(steps < 0.0) >= _RISING:
+    if len(steps) and np.mean(steps < 0.0) >= RISING:
         return f"{column.name!r} goes down from row to row; sort the rows by it, the oldest first"
-    if _is_coarse(column):
+    if is_coarse(column):
         sentence = (
             f"{column.name!r} stays the same in {int(np.sum(steps == 0.0))} of {rows} rows: its stamps are coarser "
             "than the sample period; export it with more digits, or, if the rows are equally spaced in time, say so in "
@@ -198,9 +210,7 @@ def _in_turn(table: Table) -> str:
     bare = all(re.fullmatch(r"column \d+", called) for called in table.columns)  # no headings: dates are in s
     numbers = [c for c in table.columns.values() if c.text is None]
     times = [
-        c
-        for c in numbers
-        if (role(c.name) == "time" and (_is_coarse(c) or _begins_anew(c))) or (bare and c.unit == "s")
+        c for c in numbers if (role(c.name) == "time" and (is_coarse(c) or begins_anew(c))) or (bare and c.unit == "s")
     ]
     others = [c for c in numbers if c not in times and dimension(c.unit or "") != "time"]
     values = [c for c in others if np.isfinite(c.values).any()]
@@ -216,26 +226,13 @@ def _in_turn(table: Table) -> str:
     return f"{said}, in Python by `d = pandas.read_csv(FILE, comment='#'); c = d.columns; {turned}.to_csv('log.csv')`"
 
 
-def _is_coarse(column: Column) -> bool:
-    """Whether the values go up, and stay the same between."""
-    steps = np.diff(column.values[np.isfinite(column.values)])
-    return len(steps) > 0 and float(steps.min()) == 0.0 and float(steps.max()) > 0.0
-
-
-def _begins_anew(column: Column) -> bool:
-    """Whether the values go up, and begin with the first one again."""
-    there = column.values[np.isfinite(column.values)]
-    again = np.flatnonzero(np.diff(there) < 0.0) + 1
-    return len(again) > 0 and bool(np.all(there[again] == there[0]))
-
-
 def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     """Why a table is no log over time, and what it is instead."""
     units = {dimension(c.unit or "") for c in columns} | {"adc" for c in columns if c.name.endswith("_adc")}
     numbered = next((c.name for c in columns if c.name.lower() in _ORDINALS), None)
     sentence = f"{_NO_LOG}: "
     called = next((c for c in in_time if role(c.name) == "time"), None)
-    if called is None and len(in_time) == 1 and _is_coarse(in_time[0]):
+    if called is None and len(in_time) == 1 and is_coarse(in_time[0]):
         called = in_time[0]  # as an oscilloscope rounds it
     if called is not None:
         return sentence + _why_no_time(called)
@@ -259,23 +256,8 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
 
 def _perhaps_times(columns: Sequence[Column]) -> list[str]:
     """The columns that nothing calls a time, and that go up as one does."""
-    rising = [c for c in columns if c.unit is None and _rises(c.values) and c.name.lower() not in _ORDINALS]
-    return [c.name for c in rising if role(c.name) is None or _is_even(c.values)]
-
-
-def _are_alike(a: Column, b: Column) -> bool:
-    return a is b or (a.unit == b.unit and np.allclose(a.values, b.values, rtol=1e-12, atol=1e-9, equal_nan=True))
-
-
-def _rises(values: np.ndarray) -> bool:
-    steps = np.diff(values[:100_000])
-    return len(steps) > 0 and bool(np.mean(steps > 0.0) >= _RISING)
-
-
-def _is_even(values: np.ndarray) -> bool:
-    """Whether all steps are alike, as of the time in the first row of a matrix that Simulink has saved."""
-    steps = np.diff(values[:100_000])
-    return len(steps) > 0 and bool(np.all(np.abs(steps - np.median(steps)) < 1e-3 * abs(np.median(steps))))
+    rising = [c for c in columns if c.unit is None and rises(c.values) and c.name.lower() not in _ORDINALS]
+    return [c.name for c in rising if role(c.name) is None or is_even(c.values)]
 
 
 def _groups(table: Table, time: str | None) -> dict[str, list[Column]]:
@@ -310,8 +292,10 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
                 told = " or ".join(f"{c.name} [{c.unit}]" for c in parts[:_TOLD])
                 doubt += f"; where {told} is the command, say so in a map"
             return {}, doubt + (f" (no unit: {', '.join(bare[:_TOLD])})" if bare else "")
+        if quantity == "position":
+            fits = [*fits, *(c for c in measured if c.unit is None and _IN_METRES.fullmatch(c.name.lower()))]
         if len(fits) > 1:
-            names = ", ".join(f"{c.name} [{c.unit}]" for c in fits)
+            names = ", ".join(c.name + (f" [{c.unit}]" if c.unit else "") for c in fits)
             are_speeds = all(dimension(c.unit or "") == "angular speed" for c in fits)
             return {}, f"{names} could each be the {'speed' if are_speeds else quantity}"
         found[quantity] = fits[0]
@@ -321,6 +305,8 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
         fits = [c for c in _fitting(measured, quantity) if c not in found.values()]
         if quantity == "reference":
             fits = [c for c in fits if _is_of(c, found.get("position") or found.get("velocity"))]
+        if quantity == "velocity" and "position" in found:
+            fits = [c for c in fits if _is_rate_of(c, found["position"])]
         if len(fits) == 1:
             found[quantity] = fits[0]
     return found, ""
@@ -341,6 +327,14 @@ def _is_of(reference: Column | None, answer: Column | None) -> bool:
     return dimension(reference.unit) == dimension(answer.unit)
 
 
+def _is_rate_of(speed: Column, place: Column) -> bool:
+    """Whether a speed can be that of a position: a spindle's beside an axis in mm is not."""
+    return (dimension(place.unit or ""), dimension(speed.unit or "")) not in (
+        ("length", "angular speed"),
+        ("angle", "speed"),
+    )
+
+
 def _is_strange(column: Column) -> bool:
     """Whether the file gives a unit that is none of those known."""
     return bool(column.unit) and dimension(str(column.unit)) is None
@@ -359,7 +353,10 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
     fits = [c for c in columns if dimension(c.unit or "") in dimensions]
     if quantity == "command":  # a voltage where there is one, else the torque or force of a drive, else its current
         fits = [c for c in fits if not drives_nothing(c.name)]
+        asked = [c for c in fits if is_commanded(c.name) and any(dimension(c.unit or "") in d for d in _ACTING)]
         fits = next((of for d in _ACTING if (of := [c for c in fits if dimension(c.unit or "") in d])), [])
+        if asked and not any(c in asked or is_at_the_motor(c.name) for c in fits):
+            fits = [*asked, *fits]  # a voltage beside a commanded torque may be that of the supply
     if quantity == "current":
         fits = [c for c in fits if not drives_nothing(c.name)]
     if quantity in ("position", "velocity"):
@@ -374,7 +371,8 @@ def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
         fits = places or fits
     named = [c for c in fits if role(c.name) == quantity]
     fits = named or fits
-    if quantity == "command" and len(fits) > 1:  # what acts, where the controller's unlimited answer is there too
+    # what acts, where the controller's unlimited answer is there too
+    if quantity == "command" and len(fits) > 1 and all(dimension(c.unit or "") == "voltage" for c in fits):
         acting = [c for c in fits if "voltage" in words_of(c.name)]
         fits = acting if len(acting) == 1 else fits
     return fits

@@ -19,17 +19,17 @@ _ACTS = _DRIVING | _VOLTAGES | {"current", "strom", "motorstrom", "ankerstrom"}
 _WORDS: Mapping[str, frozenset[str]] = {
     "time": _words("time t zeit timestamp timestamps elapsed seconds zeitstempel tempo tiempo"),
     "reference": _words(
-        "reference ref setpoint set desired target commanded soll demand qg sollposition lagesollwert solldrehzahl "
-        "sollgeschwindigkeit drehzahlsollwert referencia consigna consigne riferimento"
+        "reference ref setpoint sp set des desired target commanded soll demand qg sollposition lagesollwert "
+        "solldrehzahl sollgeschwindigkeit drehzahlsollwert referencia consigna consigne riferimento"
     ),
     "velocity": _words(
-        "velocity velo vel speed v rate geschwindigkeit drehzahl istdrehzahl istgeschwindigkeit drehzahlistwert "
-        "velocidade velocidad vitesse velocita"
+        "velocity velo vel speed rpm v rate omega dq geschwindigkeit drehzahl istdrehzahl istgeschwindigkeit "
+        "drehzahlistwert velocidade velocidad vitesse velocita"
     ),
     "current": _CURRENTS,
-    "command": frozenset(("command", "cmd", "u", "input", "control", "vir")).union(_DRIVING, _VOLTAGES),
+    "command": _words("command cmd u input control vir pwm duty dutycycle").union(_DRIVING, _VOLTAGES),
     "position": _words(
-        "measured position pos encoder enc y x q qm ist output angle counts feedback actual act istposition "
+        "measured position pos encoder enc y x q qm ist output angle theta counts feedback actual act istposition "
         "lageistwert lage weg istweg posicao posicion posizione salida"
     ),
 }
@@ -54,6 +54,9 @@ _COMMANDS = _words(
     "command cmd commanded setpoint demand stellgroße stellgroesse stellsignal sollspannung sollstrom sollmoment "
     "sollkraft motorspannung ankerspannung"
 )
+_COMMANDED = {"command", "cmd"}
+_GOALS = _words("position pos angle velocity velo vel speed rpm")  # of which a command is where the axis is to go
+_AT_THE_MOTOR = _words("motor armature output applied control u vm phase motorspannung ankerspannung")
 # bounds, and lengths and angles that are no position; but what is corrected by them, or comes behind them, is one
 _BOUNDS = _words("limit limits limitation grenze maximum minimum max min")
 _NO_PLACES = _words(
@@ -69,6 +72,8 @@ def role(name: str) -> str | None:
     """The quantity that a name tells: a key of `_WORDS`."""
     words = [word.lower().rstrip("0123456789") or word for word in _tokens(name)]  # time1, u2
     acts = bool(_ACTS & set(words))  # a target torque is what drives the axis, and not where it is to go
+    if not acts and _COMMANDED & set(words) and _GOALS & set(words):
+        return "reference"
     return next(
         (r for r, known in _WORDS.items() if any(word in known for word in words) and not (acts and r == "reference")),
         None,
@@ -91,6 +96,16 @@ def drives_nothing(name: str) -> bool:
     if _SUPPLIES & words or any(pair <= words for pair in _SUPPLY_PAIRS) or (_BOUNDS & words and not _BEHIND & words):
         return True
     return not _COMMANDS & words and bool(_NO_DRIVES & words or any(pair <= words for pair in _NO_DRIVE_PAIRS))
+
+
+def is_commanded(name: str) -> bool:
+    """Whether a name says that a controller commands it, as `torque cmd` does."""
+    return bool(_COMMANDS & words_of(name))
+
+
+def is_at_the_motor(name: str) -> bool:
+    """Whether a voltage of this name is surely the motor's, and not that of a drive's supply."""
+    return bool(_AT_THE_MOTOR & words_of(name))
 
 
 def is_no_place(name: str) -> bool:

@@ -104,8 +104,9 @@ def guessed(table: Table) -> LogMap:
         return found.map
     if not found.is_log:
         raise InputError(found.problem, str(table.path))
+    left_out = "".join(f"; {finding.what}" for finding in table.findings if finding.what.startswith("left out"))
     raise InputError(
-        f"{found.problem}; correct these lines and save them as {map_path(table.path).name} beside it "
+        f"{found.problem}{left_out}; correct these lines and save them as {map_path(table.path).name} beside it "
         f"(or `rds data describe FILE --write-map`):\n\n{draft(table)}",
         str(table.path),
     )

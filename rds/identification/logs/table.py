@@ -15,7 +15,11 @@ from rds.identification.logs.csv_cells import has_unit
 from rds.identification.logs.csv_headings import name_and_unit
 from rds.identification.logs.log import Finding
 
-_DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}([ T,]|$)")
+_DATE = re.compile(r"\d{1,4}[./-](\d{1,2}|[^\W\d_]{3,9})[./-]\d{1,4}(?!\d)")
+DATE_REMEDY = (
+    "write dates as 2024-05-01 12:00:00.001 (of others nobody knows which is the day), times of day as 12:00:00.001, "
+    "or the time in s"
+)
 _OF_DAY = re.compile(r"(\d+ days? )?\d{1,2}:\d\d\b")
 _POINT = re.compile(r"[+-]?[0-9]+\.[0-9]+")
 _OTHER_THOUSANDS = re.compile(r"[+-]?\d{1,3}([.'\u2019\u00a0\u202f ])\d{3}(\1\d{3})*(,\d+|\.\d+)?")
@@ -83,11 +87,9 @@ class Table:
 
 def remedy(cell: str) -> str:
     """What to do about a cell that is no number."""
+    cell = cell.strip()
     if _DATE.match(cell):
-        return (
-            "write dates as 2024-05-01 12:00:00.001 (of others nobody knows which is the day), times of day as "
-            "12:00:00.001, or the time in s"
-        )
+        return DATE_REMEDY
     if _OF_DAY.match(cell):
         return "write times of day as 13:00:00.001 (24 hours, a point before the fraction), spans as s"
     if _POINT.fullmatch(cell):  # no number where decimal commas were found, or said

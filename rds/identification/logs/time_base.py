@@ -11,6 +11,7 @@ from rds.core.errors import InputError
 from rds.identification.logs.log import Finding, Gravity
 
 _GAP = 1.5  # sample periods: a longer step has samples missing in it
+_AGAIN = 2.0  # sample periods within which recordings begin at the same time
 _HOUR = 3600.0  # s
 _LEFT_OVER = 0.05  # of the samples: so many before the time goes back, once, may be left from before the recording
 _ROUGH = 0.5  # periods: beyond it a step is hardly one of a regular recording
@@ -40,8 +41,10 @@ def time_base(time: np.ndarray, jitter_limit: float, duplicates: str, gaps: str,
     back = np.flatnonzero(steps < 0.0)
     if len(back):
         k = int(back[0]) + 1
-        remedy = "is the column the time, and is it one recording? Of a counter that begins again, say in the map at "
-        remedy += "which number, as in wrap = 65536 under [time]"
+        remedy = "is the column the time, and is it one recording? "
+        if len(back) > 1 and np.ptp(time[[0, *(back + 1)]]) <= _AGAIN * float(np.median(np.abs(steps))):
+            remedy = f"where {len(back) + 1} recordings stand one after another, put each into a file of its own. "
+        remedy += "Of a counter that begins again, say in the map at which number, as in wrap = 65536 under [time]"
         if len(back) == 1 and _HOUR - 60.0 < -steps[k - 1] < _HOUR:
             remedy = (
                 "a clock that is set back by an hour does so, as where summer time ends: log UTC, or give the later "

@@ -51,6 +51,7 @@ _SPELLINGS: Mapping[str, str] = MappingProxyType(
         **dict.fromkeys(("radian", "radians"), "rad"),
         **dict.fromkeys(("°/s", "deg/sec", "dps"), "deg/s"),
         **{f"{length}/sec": f"{length}/s" for length in ("m", "mm", "um", "in", "rad")},
+        **dict.fromkeys(("pct", "percent", "Percent"), "%"),
         **dict.fromkeys(("rpm", "RPM", "r/min", "U/min", "1/min", "min-1"), "rev/min"),
         **dict.fromkeys(("krpm", "kRPM"), "krev/min"),
         **dict.fromkeys(("turn", "turns"), "rev"),
@@ -92,12 +93,20 @@ _ENDINGS = (
     "N",
     "Nm",
     "rpm",
+    "pct",
+    "percent",
 )
+_OF_RPM = re.compile(r"(?:.*[_ ])?rpm(?:[_ ]?\w+)?|(?:.*[_ ])?RPM(?:[_ ]?\w+)?")
+_OF_TORQUE = re.compile(r"(?:.*_)?(?:torque|tau)_(?:.*_)?nm")  # of which nm is no length
 _RATES = re.compile(r"(?P<stem>.+?)_(?P<unit>mm|um|m|cm|in|deg|rad|rev|counts|inc)_(?:p|per)?_?(?P<time>s|sec|min)")
 
 
 def unit_of_name(name: str) -> str | None:
-    """The unit that a name ends with, as `pos_mm` and `velocity_mm_s` do; None where it ends with none."""
+    """The unit that a name ends with, as `pos_mm` and `velocity_mm_s` do; `rpm_left` has one, too. None for none."""
+    if _OF_RPM.fullmatch(name):
+        return "rev/min"
+    if _OF_TORQUE.fullmatch(name):
+        return "Nm"
     if rate := _RATES.fullmatch(name):
         unit = f"{rate['unit']}/{'s' if rate['time'] == 'sec' else rate['time']}"
         return unit if dimension(unit) else None
@@ -146,6 +155,8 @@ def known_units(unit: str, dimensions: Iterable[str]) -> str:
     spelled |= {name.casefold(): name for name in known}
     close = get_close_matches(plain(unit).casefold(), spelled, n=1, cutoff=_ALIKE)
     hint = f"; did you mean {spelled[close[0]]!r}?" if close else ""
+    if unit == "Hz" and "rev/s" in known:
+        hint = "; revolutions in a second are 'rev/s', where they are the axis's and no electrical ones"
     return f"known units: {', '.join(known)}{hint}"
 
 
@@ -158,7 +169,12 @@ def check_unit(unit: str, dimensions: Iterable[str], what: str) -> str:
         raise InputError(f"unit {unit!r} of {what} is unknown; {known_units(unit, allowed)}")
     if found not in allowed:
         known = [name for d in allowed for name in _DIMENSIONS[d][1]]
-        raise InputError(f"{what} is in {unit!r}, which measures {found}; it must be in one of {', '.join(known)}")
+        hint = ""
+        if "voltage" in allowed and found in ("length", "angle", "counts", "speed", "angular speed", "count speed"):
+            hint = "; where a drive is told to go is its reference, and the voltage, current or torque that moves the "
+            hint += "axis its command"
+        one_of = f"it must be in one of {', '.join(known)}"
+        raise InputError(f"{what} is in {unit!r}, which measures {found}; {one_of}{hint}")
     return found
 
 

@@ -232,7 +232,8 @@ def _starts(
     """Values to begin a fit with: what inverse dynamics makes of the logs."""
     from rds.identification.fit.inverse_dynamics import regress_logs
 
-    found = regress_logs(logs, made_of(form, options, output, command), {})
+    # a search begins well enough with what a spline makes of gaps
+    found = regress_logs(logs, made_of(form, options, output, command), {}, bridged=np.inf)
     values = {name: value if name == "offset" else max(value, 1e-9) for name, value in found.values.items()}
     states: list[tuple[float, ...]] = []
     for log in logs:
