@@ -118,6 +118,11 @@ def test_what_never_rises_or_settles_has_no_value() -> None:
 def test_steady_state_error_is_the_mean_of_the_end() -> None:
     run = errors(np.where(TIME < 1.9, 9.0, -0.25 + 0.1 * np.sign(np.sin(2 * np.pi * (TIME + T / 2) / 0.02))))
     assert measured("steady-state-error", run) == pytest.approx(0.25, abs=1e-12)
+    numbered = errors(np.arange(float(N)))
+    assert measured("steady-state-error", numbered) == 1949.5, "the last 100 samples"
+    assert measured("steady-state-error", numbered, last=0.01, until=0.3) == 294.5, "samples 290 to 299"
+    with pytest.raises(NotMeasured, match="ended before"):
+        measured("steady-state-error", numbered, until=9.0)
 
 
 def test_effort_and_saturation_of_a_square_wave() -> None:
@@ -159,7 +164,7 @@ def test_lagging_on_a_circle_is_no_contour_error_and_a_smaller_circle_is() -> No
     from rds.grading.cases import CaseRun
     from rds.results import Result
 
-    def circle(radius: float, lag: float) -> CaseRun:
+    def circle(radius: float, lag: float, **noise: Any) -> CaseRun:
         wanted, there = np.pi * TIME, np.pi * TIME - lag
         columns = {
             "time": TIME,
@@ -168,12 +173,15 @@ def test_lagging_on_a_circle_is_no_contour_error_and_a_smaller_circle_is() -> No
             "X_measured": radius * np.cos(there),
             "Y_measured": radius * np.sin(there),
         }
-        return CaseRun("circle", 0, Result(columns, {}, {"axes": ["X", "Y"], "sample_period": T}))
+        columns |= {"contour_error": np.full(N, 0.7)} if noise else {}
+        return CaseRun("circle", 0, Result(columns, {}, {"axes": ["X", "Y"], "sample_period": T}), facts=noise)
 
     assert measured("contour-error", circle(10.0, 0.05), **{"from": 0.1}) < 2e-5  # the chords of the path
     assert measured("contour-error", circle(9.8, 0.05), **{"from": 0.1}) == pytest.approx(0.2, abs=2e-5)
     assert measured("path-followed", circle(9.8, 0.05), tolerance=0.21, **{"from": 0.1}) == 100.0
     assert measured("path-followed", circle(9.8, 0.05), tolerance=0.19, **{"from": 0.1}) == 0.0
+    assert measured("contour-error", circle(9.8, 0.05, noisy=False)) == 0.7, "as the program's run has judged it"
+    assert measured("contour-error", circle(9.8, 0.05, noisy=True), **{"from": 0.1}) == pytest.approx(0.2, abs=2e-5)
     with pytest.raises(NotMeasured, match="two linear axes"):
         measured("contour-error", errors(np.ones(N)))
 
