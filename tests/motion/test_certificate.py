@@ -87,3 +87,26 @@ def test_the_ratio_is_of_the_time_from_the_first_sample_to_the_last() -> None:
     assert "It takes 1.500 times the 0.200 s" in certificate.sentence()
     least.seconds = 0.0
     assert certificate.ratio is None
+
+
+def test_the_sentence_names_the_axis_that_comes_nearest() -> None:
+    certificate = Certificate(Limits.from_axes({"X": (10.0, 1e3, 1e5), "Y": (5.0, 1e4, 1e7)}), promised=("velocity",))
+    ramp = np.arange(30.0) * 0.045
+    certificate.add(block(ramp, ramp, line=2))
+    assert certificate.sentence() == (
+        "Certificate: all 30 planned samples keep the velocity of every axis (at most 90.0 %: velocity of Y in line 2)."
+        " Not promised: acceleration (45 % of the limit: X in line 2), jerk (45 % of the limit: X in line 2), the path "
+        "(at most 0.0000 mm off, in line 0)."
+    )
+    broken = seen(block(ramp * 2.5), promised=("velocity",))
+    assert broken.sentence().startswith("The planned motion breaks its limits in 29 places; first: line 7: velocity")
+
+
+def test_the_trace_is_the_largest_of_each_bin_at_its_time() -> None:
+    assert seen().trace().shape == (0, 20)
+    moved = np.zeros(70_000)
+    moved[40_000:] = 0.05
+    short, long = seen(block(moved[39_983:40_020])).trace(), seen(block(moved)).trace()
+    assert short[:, 0] == pytest.approx([0.0, 0.16, 0.32]) and short[:, 1] == pytest.approx([0.0, 0.5, 0.0])
+    assert len(long) == 2188 and long[:, 0] == pytest.approx(0.32 * np.arange(2188)), "bins are joined in pairs"
+    assert np.flatnonzero(long[:, 1]).tolist() == [1250] and long[1250, 1] == pytest.approx(0.5)
