@@ -63,6 +63,18 @@ def test_an_owner_ends_its_own_faults_and_clear_those_of_all(medium: Medium[str]
     assert not a.hung and not b.hung, "what is still to come is ended, too"
 
 
+def test_faults_of_frames_end_with_their_owner_or_with_those_of_all(medium: Medium[str]) -> None:
+    hand, one, other = Hand(medium), object(), object()
+    for identifier, owner in ((1, one), (2, other), (3, None)):
+        hand.inject("lose", identifier=identifier, count=10, owner=owner)
+    for now, owner, expected in ((0, one, ["BC", "", ""]), (SECOND, None, ["BC", "BC", "BC"])):
+        hand.injector.withdraw(owner, now)
+        for identifier in (1, 2, 3):
+            medium.offer("A", record(identifier), now)
+        assert heard(medium, now + SECOND // 2) == list(zip((1, 2, 3), expected, strict=True))
+    assert medium.frame_faults.struck == 2
+
+
 @pytest.mark.parametrize("ended", ["by a plug", "by its owner", "by its time"])
 def test_a_fault_that_is_over_is_not_lifted_again(ended: str) -> None:
     """Whoever is plugged in listens for eleven bits first: a frame would wait for them."""

@@ -59,6 +59,7 @@ def test_it_turns_back_at_the_instant_at_which_it_stands() -> None:
 @pytest.mark.parametrize("u, moves", [(0.33, 0), (0.34, 1), (-0.49, 0), (-0.51, -1)])
 def test_at_rest_it_sticks_up_to_its_friction(u: float, moves: int) -> None:
     """0.6/1.8 V forward, 0.9/1.8 V backward; and whatever moves comes to rest within that."""
+    assert make(**WET).initial_state == (0.0, 0.0) and make(**WET).has_velocity
     position, velocity = advance((1.0, 0.0), u, 0.01, params(**WET))
     assert (position > 1.0) - (position < 1.0) == (velocity > 0.0) - (velocity < 0.0) == moves
     if not moves:
