@@ -6,7 +6,6 @@ from math import atan, degrees, inf, pi, sqrt
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from rds.identification.validate.discrepancy import Off, _figure, _gain_of, by_chance, clear, error_of, log_of
 from rds.identification.validate.within import Measure
@@ -32,6 +31,9 @@ def test_each_figure_is_model_less_log() -> None:
     assert _figure("backward", MODEL, LOG, F, 10.0) == pytest.approx(100.0 * (0.72 / 2.2 - 0.15) / 10.0)
     apart = {"K": 2.0, "tau": 0.01, "delay": 0.001, "friction_plus": 0.4, "friction_minus": -0.6}
     assert _figure("backward", apart, LOG, F, 10.0) == pytest.approx(100.0 * (0.3 - 0.15) / 10.0)
+    still = {**LOG, "K": 0.0}
+    assert _figure("gain", MODEL, still, F, 10.0) == _figure("static", MODEL, still, F, 10.0) == inf
+    assert _figure("forward", still, LOG, F, 10.0) == inf
 
 
 def test_viscous_friction_which_both_have_takes_of_gain_and_time_constant() -> None:
@@ -47,13 +49,15 @@ def test_the_error_of_a_figure_is_that_of_its_covariance() -> None:
     assert error_of(lambda p: 3.0 * p[0] - 2.0 * p[1], point, covariance) == pytest.approx(sqrt(36 + 36 - 12))
     assert error_of(lambda p: p[2], point, covariance) == inf
     assert error_of(lambda p: 5.0, point, covariance) == 0.0
+    for one_sided in (lambda p: max(p[0], 0.0), lambda p: min(p[0], 0.0)):  # a bound at which it is flat to one side
+        assert error_of(one_sided, np.zeros(1), np.eye(1)) == 1.0
     # bent: to the farther end, from 0 to 1 of x² (no slope), from 1 to 9 at 1
     assert error_of(lambda p: p[0] ** 2, np.zeros(1), np.eye(1)) == 1.0
     assert error_of(lambda p: p[0] ** 2, np.ones(1), 4.0 * np.eye(1)) == pytest.approx(8.0)
 
 
 def test_chance_is_told_by_the_distribution_of_chi_square() -> None:
-    bound = 2.0 * (1.0 + chi2.ppf(0.99, 3) / 50.0)
+    bound = 2.0 * (1.0 + 11.344866730144373 / 50.0)  # of three degrees of freedom, 99 %
     assert by_chance(bound * (1 - 1e-9), 2.0, 50.0, 3) and not by_chance(bound * (1 + 1e-9), 2.0, 50.0, 3)
 
 
@@ -69,8 +73,11 @@ def test_of_the_gains_the_worse_of_two_that_are_told_counts_else_the_surer() -> 
         (off(9.0, 1.1), off(1.0, 0.5), "bandwidth"),
     ):
         assert _gain_of(rest, bandwidth) is {"rest": rest, "bandwidth": bandwidth}[expected]
-    assert clear(off(-3.0, 0.5)) == 6.0 and clear(off(3.0, inf)) == clear(off(3.0, 0.0)) == 0.0
-    assert log_of(2.0) == pytest.approx(0.6931, abs=1e-4) and log_of(-1.0) == log_of(inf) == log_of(0.0) == 0.0
+    assert clear(off(-3.0, 0.5)) == 6.0 and clear(off(3.0, inf)) == clear(off(3.0, 0.0)) == clear(off(inf, inf)) == 0.0
+    assert (
+        log_of(2.0) == -log_of(0.5) == pytest.approx(0.6931, abs=1e-4)
+        and log_of(-1.0) == log_of(inf) == log_of(0.0) == 0.0
+    )
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
