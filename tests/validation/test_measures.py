@@ -31,6 +31,8 @@ def test_each_figure_is_model_less_log() -> None:
     assert _figure("backward", MODEL, LOG, F, 10.0) == pytest.approx(100.0 * (0.72 / 2.2 - 0.15) / 10.0)
     apart = {"K": 2.0, "tau": 0.01, "delay": 0.001, "friction_plus": 0.4, "friction_minus": -0.6}
     assert _figure("backward", apart, LOG, F, 10.0) == pytest.approx(100.0 * (0.3 - 0.15) / 10.0)
+    plain = {"K": 2.0, "tau": 0.01, "delay": 0.001, "friction": 0.4}
+    assert _figure("forward", plain, LOG, F, 10.0) == pytest.approx(100.0 * (0.2 - 0.15) / 10.0)
     still = {**LOG, "K": 0.0}
     assert _figure("gain", MODEL, still, F, 10.0) == _figure("static", MODEL, still, F, 10.0) == inf
     assert _figure("forward", still, LOG, F, 10.0) == inf
