@@ -67,9 +67,10 @@ def test_a_slow_first_sample_is_not_what_the_run_is_blamed_for() -> None:
 
 
 def test_a_sample_that_is_complete_when_the_next_is_due_is_in_time() -> None:
-    none = np.zeros(3)
-    timing = Timing(np.arange(3), none, np.array([0, MS, MS + 1]), none, none, none, none)
-    assert late_samples(timing, MS).tolist() == [False, False, True]
+    none = Timing(np.arange(3), *np.zeros((6, 3)))
+    for stage in ("lateness", "io", "interpolate", "compute", "model"):
+        timing = replace(none, **{stage: np.array([0, MS, MS + 1])})
+        assert late_samples(timing, MS).tolist() == [False, False, True], stage
 
 
 def test_a_run_without_a_sample_has_a_verdict_and_a_summary() -> None:
@@ -97,6 +98,9 @@ def test_the_sentences_of_slow_code_say_how_slow_and_whose() -> None:
     judgement = judge(timing, MS, **counts)
     assert judgement.reason.startswith("control() and the model took 4.010 ms at most, of a sample period of 1 ms (")
     assert judge(timing, MS, **counts, limit=20).late_without_system == 0
+    often = some(50, 2.0)
+    often[500] = 9.0
+    assert "took 2.010 ms at the 99th percentile" in judge(ran(compute=often)[0], MS).reason
     timing, counts = ran(compute=1.99)
     shared = replace(timing, interpolate=1.5 * timing.compute / 1.99, compute=0.49 * timing.compute / 1.99)
     assert judge(shared, MS, **counts).reason.startswith(

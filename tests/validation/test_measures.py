@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import atan, degrees, inf, pi, sqrt
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rds.identification.validate.discrepancy import Off, _figure, _gain_of, by_chance, clear, error_of, log_of
-from rds.identification.validate.within import Measure
+from rds.identification.validate.verdict import Bands
+from rds.identification.validate.within import (
+    Measure,
+    as_good,
+    as_good_velocity,
+    foreseen_at,
+    judged_by,
+    of_noise,
+    passes,
+    skilled_at,
+)
 
 MODEL = {"K": 2.2, "tau": 0.02, "delay": 0.003, "friction": 0.5, "offset": 0.1}
 LOG = {"K": 2.0, "tau": 0.01, "delay": 0.001, "friction": 0.3, "offset": 0.0}
@@ -112,3 +125,54 @@ def test_borderline_is_from_three_quarters_to_four_thirds_of_the_band() -> None:
     for value, expected in ((3.74, False), (3.76, True), (-6.6, True), (6.7, False)):
         assert Measure("gain", Off(value, 1.0, "%"), 5.0).borderline is expected
     assert Measure("gain", Off(-3.0, 1.5, "%"), 5.0).reach == 6.0
+
+
+def seen(**more: Any) -> Any:
+    """What the rules read of an assessment: noise of 0.01 mm, velocities over blocks of 10 samples of 1 ms."""
+    usual = {"noise": 0.01, "block": 10, "log": SimpleNamespace(sample_period=0.001), "as_motion": "motion"}
+    errors = {"residual": np.array([0.1, -0.1]), "free_run": fit(90.0, 1.0), "velocity": None}
+    return SimpleNamespace(**{**usual, **errors, **more})
+
+
+def fit(percent: float, rmse: float) -> Any:
+    return SimpleNamespace(fit_percent=percent, rmse=rmse)
+
+
+def test_a_model_is_as_good_as_noise_lets_any_be_within_a_fifth() -> None:
+    for size, expected in ((0.0119, True), (0.0121, False)):
+        noisy = seen(residual=3.0 + size * np.array([1.0, -1.0]))  # a constant beside it does not count
+        assert as_good(noisy) is expected and not as_good(seen(residual=noisy.residual, as_motion=None))
+        assert of_noise(noisy, fit(0.0, sqrt(2.0) * size)) is expected
+        # of the difference over 10 ms of two positions
+        assert as_good_velocity(seen(velocity=fit(0.0, sqrt(2.0) * size / 0.01))) is expected
+    assert not as_good(seen(residual=np.zeros(2), free_run=None)) and not as_good_velocity(seen())
+
+
+def test_the_free_run_passes_by_its_band_or_by_noise_in_position_and_velocity() -> None:
+    bands = replace(Bands(), fit_percent=90.0)
+    good, bad, quiet = fit(90.0, 9.0), fit(89.9, 9.0), np.zeros(2)
+    assert passes(seen(free_run=good), bands) == (True, True)
+    assert passes(seen(free_run=bad), bands) == passes(seen(free_run=None), bands) == (False, False)
+    assert passes(seen(free_run=bad, residual=quiet), bands) == (True, True)
+    assert passes(seen(free_run=good, velocity=bad), bands) == (True, False)
+    assert passes(seen(free_run=bad, velocity=good), bands) == (False, True)
+    assert passes(seen(free_run=good, velocity=fit(0.0, 1.0)), bands) == (True, True)  # 1.4 mm/s is noise
+
+
+def test_skill_is_to_beat_no_model_and_foresight_to_leave_what_a_free_run_may_of_the_way() -> None:
+    bands = replace(Bands(), fit_percent=90.0, skill=0.5)
+    ahead = {1: fit(0.0, 0.49), 2: fit(0.0, 0.5), 5: fit(0.0, 0.51), 10: fit(0.0, 0.1)}
+    naive = {1: fit(0.0, 1.0), 2: fit(0.0, 1.0), 5: fit(0.0, 2.0)}
+    a = seen(ahead=ahead, naive=naive, measured=np.arange(50.0) * 1.01)
+    assert skilled_at(a, bands) == [1, 5]
+    assert foreseen_at(a, bands) == []  # after 5 samples, a tenth of the way of 5.05 mm is 0.505 mm
+    ahead[5] = fit(0.0, 0.5)
+    assert foreseen_at(a, bands) == [5]
+
+
+def test_the_axis_is_the_measure_where_it_explains_the_log_or_the_model_does_not_come_near_it() -> None:
+    bands = replace(Bands(), unexplained=2.0, attainable=1.5)
+    for reached, rmse, judged in ((0.02, 0.02, True), (0.021, 0.031, False), (0.021, 0.032, True)):
+        axis = SimpleNamespace(reached=reached, rmse=rmse)
+        assert judged_by(seen(as_axis=axis), bands) is (axis if judged else "motion")
+    assert judged_by(seen(as_axis=None), bands) == "motion"
