@@ -23,6 +23,9 @@ import pytest
 from waiting import wait_for
 
 from rds.bus.hub import connect
+from rds.bus.medium.medium import Medium
+
+from . import wires
 
 FORK = multiprocessing.get_context("fork")  # quick, and these tests hold no threads when they fork
 
@@ -136,3 +139,9 @@ def is_free(lock: Path) -> bool:
     except OSError:
         return False
     return True
+
+
+@pytest.fixture(params=["timed", "untimed"])
+def medium(request: pytest.FixtureRequest) -> Medium[str]:
+    """A bus with nodes A, B and C, in virtual time."""
+    return wires.bus() if request.param == "timed" else wires.untimed()

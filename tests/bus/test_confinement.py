@@ -212,6 +212,79 @@ def test_bus_off_after_32_errors_and_back_after_128_times_11_bits() -> None:
         medium.restart("A", now + 2 * 10**9)
 
 
+def test_who_is_off_stays_off_and_counts_nothing() -> None:
+    counters = ErrorCounters()
+    for _ in range(32):
+        counters.failed_to_send()
+    counters.sent()
+    counters.failed_to_receive()
+    assert (counters.tec, counters.rec, counters.state) == (255, 0, ErrorState.OFF)
+
+
+def test_a_controller_warns_from_96_receive_errors_on() -> None:
+    counters = ErrorCounters()
+    for number in range(1, 98):
+        counters.failed_to_receive()
+        assert counters.warning is (number >= 96)
+
+
+def test_who_is_bus_off_hears_nothing_until_it_is_back() -> None:
+    medium = bus()
+    changes: list[tuple[str, ErrorState]] = []
+    medium._changed = lambda node, station: changes.append((node, station.counters.state))
+    now = make_off(medium)
+    medium.offer("B", record(1), now)
+    assert [set(delivery.deaf) for delivery in drain(medium, now + 10**6)] == [{"A"}]
+    medium.restart("A", now + 10**6)
+    medium.offer("B", record(2), now + 10**7)
+    assert [set(delivery.deaf) for delivery in drain(medium, now + 2 * 10**7)] == [set()]
+    assert changes[1:] == [("A", ErrorState.OFF), ("A", ErrorState.ACTIVE)]
+
+
+@pytest.mark.parametrize("gone", ["unplug", "die"])
+def test_who_is_cut_off_does_not_come_back_from_bus_off(gone: str) -> None:
+    medium = bus()
+    now = make_off(medium)
+    getattr(medium, gone)("A", now)
+    medium.restart("A", now)
+    medium.take(now + 2 * RECOVERY)
+    assert medium.stations["A"].counters.state is ErrorState.OFF and medium.due() is None
+
+
+def test_two_that_recover_come_back_each_at_its_time() -> None:
+    medium = bus()
+    for station in (medium.stations["A"], medium.stations["B"]):
+        station.counters.tec, station.counters.state = 256, ErrorState.OFF
+    medium.restart("A", 10**6)
+    medium.restart("B", 10**6 + 500)
+    back = []
+    while (due := medium.due()) is not None:
+        medium.take(due)
+        back.append((due, [medium.stations[name].counters.state for name in "AB"]))
+    first = 10**6 + RECOVERY
+    assert back == [(first, [ErrorState.ACTIVE, ErrorState.OFF]), (first + 500, [ErrorState.ACTIVE] * 2)]
+
+
+def test_whoever_leaves_while_it_recovers_is_waited_for_no_longer() -> None:
+    medium = bus()
+    now = make_off(medium)
+    medium.restart("A", now)
+    medium.leave("A", now)
+    assert medium.due() is None
+
+
+def test_the_unplugged_acknowledge_nothing_and_count_nothing() -> None:
+    medium = bus()
+    for name in "BC":
+        medium.unplug(name, 0)
+    medium.offer("A", record(5), 0)
+    assert settle(medium, 10**6) == [] and counters(medium, "A", "B", "C") == [(128, 0), (0, 0), (0, 0)]
+    medium.plug("B", 10**6)
+    (delivery,) = drain(medium, 2 * 10**6)
+    assert set(delivery.deaf) == {"C"} and medium.stations["A"].sent == 1
+    assert medium.stations["A"].bits * BIT == frame_time(5, bitrate=MBIT) + 3 * BIT
+
+
 def test_recovery_counts_what_is_recessive_between_frames() -> None:
     """Frames back to back have eleven recessive bits at their ends: 128 of them are enough."""
     medium = bus()
@@ -288,6 +361,7 @@ def test_who_asks_for_error_frames_gets_its_controllers() -> None:
     assert texts[0] == "bus error while sending (TEC 8, REC 0)"
     assert "transmit warning (TEC 96, REC 0)" in texts and "transmit passive (TEC 128, REC 0)" in texts
     assert texts[-1] == "bus off (TEC 255, REC 0)"
+    assert sum(text.startswith("transmit") for text in texts) == 2, "a state is told when it changes"
     assert all(delivery.frame[13] & wire.ERROR for delivery in seen)
     wire.check_frame(seen[0].frame[wire.KEY_AT])
 

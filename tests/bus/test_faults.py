@@ -16,48 +16,10 @@ from rds.bus.hub.faults import Faults
 from rds.bus.medium.bits import frame_time
 from rds.bus.medium.fault_file import read_faults
 from rds.bus.medium.fault_kinds import KINDS, Fault
-from rds.bus.medium.injector import Injector
-from rds.bus.medium.medium import FaultRefused, Medium, UntimedMedium
-from rds.bus.medium.station import Station
+from rds.bus.medium.medium import FaultRefused, Medium
 from rds.core.errors import InputError
 
-from .wires import MBIT, bus, drain, identifier_of, record
-
-SECOND = 1_000_000_000
-
-
-def untimed() -> UntimedMedium[str]:
-    medium: UntimedMedium[str] = UntimedMedium()
-    for number, name in enumerate("ABC"):
-        medium.join(name, Station(number, name), 0)
-    return medium
-
-
-@pytest.fixture(params=["timed", "untimed"])
-def medium(request: pytest.FixtureRequest) -> Medium[str]:
-    return bus() if request.param == "timed" else untimed()
-
-
-class Hand:
-    """An injector, and what it noted."""
-
-    def __init__(self, medium: Medium[str]):
-        self.notes: list[str] = []
-        self.medium = medium
-        self.injector = Injector(medium, self.notes.append)
-
-    def inject(self, kind: str, now: int = 0, owner: object = None, **words: Any) -> None:
-        self.injector.inject([Fault(kind, **words)], now, owner)
-
-
-def heard(medium: Medium[str], now: int) -> list[tuple[int, str]]:
-    """(identifier, who got it) of what is complete."""
-    found = []
-    for delivery in drain(medium, now):
-        getters = [name for name in "ABC" if name != delivery.sender and name not in delivery.deaf]
-        found.append((identifier_of(delivery), "".join(getters)))
-    return found
-
+from .wires import MBIT, SECOND, Hand, bus, drain, heard, identifier_of, record, untimed
 
 # --- words
 
@@ -347,51 +309,6 @@ def test_what_needs_bits_is_refused_without_them(kind: str) -> None:
 
 
 # --- the injector
-
-
-def test_an_unknown_node_is_refused_at_once_and_noted_later(medium: Medium[str]) -> None:
-    hand = Hand(medium)
-    with pytest.raises(FaultRefused, match=r"no node is called 'Q'; on the bus: A, B, C"):
-        hand.inject("unplug", node="Q")
-    hand.inject("unplug", node="Q", at=1.0)
-    medium.take(2 * SECOND)
-    assert len(hand.notes) == 1 and "'Q'" in hand.notes[0]
-
-
-def test_what_has_an_owner_ends_with_it(medium: Medium[str]) -> None:
-    hand, owner = Hand(medium), object()
-    hand.inject("unplug", node="B", owner=owner)
-    hand.inject("lose", node="A", count=10, owner=owner)
-    hand.inject("hang", node="C", at=5.0, owner=owner)
-    hand.inject("hang", node="C", duration=0.5)
-    medium.offer("A", record(1), 0)
-    assert heard(medium, SECOND) == [(1, "")]
-    hand.injector.withdraw(owner, SECOND)
-    medium.offer("A", record(2), SECOND)
-    assert heard(medium, 2 * SECOND) == [(2, "BC")]
-    medium.take(10 * SECOND)
-    assert not medium.stations["C"].hung
-
-
-def test_a_plug_may_be_put_back_early(medium: Medium[str]) -> None:
-    hand = Hand(medium)
-    hand.inject("unplug", node="B", duration=5.0)
-    hand.inject("plug", node="B", at=1.0)
-    hand.inject("unplug", node="B", at=4.0)
-    medium.take(2 * SECOND)
-    assert medium.stations["B"].plugged
-    medium.take(6 * SECOND)
-    assert not medium.stations["B"].plugged, "the end of the first one does not end the second"
-
-
-def test_a_node_that_leaves_takes_its_faults_along(medium: Medium[str]) -> None:
-    hand = Hand(medium)
-    hand.inject("unplug", node="B", duration=1.0)
-    medium.leave("B", SECOND // 2)
-    medium.take(2 * SECOND)
-    hand.injector.withdraw(None, 3 * SECOND)
-    medium.offer("A", record(1), 3 * SECOND)
-    assert [delivery.sender for delivery in drain(medium, 4 * SECOND)] == ["A"]
 
 
 @pytest.mark.parametrize("schedule", ["abc", [{"kind": "unplug"}], [None]])

@@ -12,6 +12,7 @@ import pytest
 import rds
 from rds.core.types import Ending
 from rds.modes import load_mode
+from rds.modes.loop.following_error import ErrorLimits, FollowingGuard, Watched
 
 SINE = rds.sinusoid(5.0, 0.5)  # its speed is 15.7 mm/s at most
 
@@ -60,6 +61,22 @@ def test_less_is_allowed_when_the_reference_is_slower() -> None:
     beyond = np.flatnonzero(error > allowed)
     assert len(beyond) and len(ramp) == beyond[0] + 1  # the first sample that is beyond what is allowed at its speed
     assert run({"ferror": ferror}).meta["ending"] == "done"  # and MIN_FERROR is FERROR where it is not given
+
+
+def test_what_is_allowed_and_the_first_that_is_beyond_it_by_hand() -> None:
+    limits = ErrorLimits(at_rest=0.2, at_top_speed=1.0, top_speed=50.0)
+    assert [limits.at(velocity) for velocity in (0.0, 5.0, 25.0, -25.0, -80.0)] == [0.2, 0.2, 0.5, 0.5, 1.0]
+    guard = FollowingGuard([Watched("X", "mm", limits, 0), Watched("Y", "mm", limits, 4)], [1], 0.001)
+    voltages = [1.0, 2.0]
+    guard.law(6, [], [0.5, -25.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2], voltages)
+    assert guard.over() is None and voltages == [1.0, 2.0], "both are off by just what is allowed"
+    guard.law(7, [], [0.0, 0.0, 0.0, 0.0, 0.0, -10.0, 0.0, 0.25], voltages)
+    guard.law(8, [], [9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], voltages)
+    ending, reason = guard.over() or (None, "")
+    assert ending is Ending.FOLLOWING_ERROR and voltages == [1.0, 0.0]
+    assert reason.startswith(
+        "axis Y was 0.25 mm from its reference at t = 0.007 s, and 0.2 mm are allowed at 10 mm/s; "
+    )
 
 
 def test_one_axis_ends_all() -> None:

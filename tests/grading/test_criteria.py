@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rds.grading.criteria import KINDS
-from rds.grading.criteria.measuring import NotMeasured
+from rds.grading.criteria.measuring import NotMeasured, Step, crossing
 from rds.grading.sandbox.work_counts import WorkCounts
 from tests.grading.made import T, run_of
 
@@ -44,6 +44,17 @@ def test_the_first_period_is_left_out_as_in_every_result_and_a_window_goes_befor
     assert measured("max-error", errors(error), **{"from": 1.0, "until": 1.5}) == 1.0
     with pytest.raises(NotMeasured, match="no sample"):
         measured("max-error", errors(error), **{"from": 9.0})
+    numbered = errors(np.arange(float(N)))
+    assert measured("mean-error", numbered, **{"from": 0.1, "until": 0.2}) == 149.5, "samples 100 to 199"
+    for end in (0.3, 0.7):  # neither is a whole number of periods in floating point
+        assert measured("max-error", numbered, until=end) == round(end / T) - 1
+
+
+def test_what_has_no_reference_or_no_finite_error_is_not_measured() -> None:
+    with pytest.raises(NotMeasured, match="axis X has no reference"):
+        measured("max-error", run_of({"X_measured": np.zeros(N)}))
+    with pytest.raises(NotMeasured, match="no finite error"):
+        measured("rms-error", errors(np.full(N, 1e200)))
 
 
 def test_a_first_order_response_rises_and_settles_by_its_time_constant() -> None:
@@ -51,6 +62,7 @@ def test_a_first_order_response_rises_and_settles_by_its_time_constant() -> None
     assert measured("rise-time", run) == pytest.approx(TAU * np.log(9.0), abs=1e-5)
     assert measured("settling-time", run) == pytest.approx(TAU * np.log(50.0), abs=T)
     assert measured("settling-time", run, within=5.0) == pytest.approx(TAU * np.log(20.0), abs=T)
+    assert measured("settling-time", run, within=100.0) == 0.0
     assert measured("overshoot", run) == 0.0
     assert measured("steady-state-error", run, last=0.1) < 1e-7
 
@@ -80,7 +92,20 @@ def test_a_step_later_and_from_elsewhere_is_measured_as_one_from_zero_at_the_sta
             assert measured(kind, run_of(columns), **step) == pytest.approx(measured(kind, first), rel=1e-9)
 
 
+def test_a_level_is_crossed_on_the_line_between_two_samples() -> None:
+    step = Step(np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.0, 0.2, 0.6, 1.0]))
+    assert [crossing(step, level) for level in (0.1, 0.4, 0.6, 0.9)] == pytest.approx([0.5, 1.5, 2.0, 3.5])
+
+
+def test_what_is_in_the_band_at_the_last_sample_has_settled() -> None:
+    assert measured("settling-time", response(np.where(np.arange(N) < N - 1, 0.0, 1.0))) == pytest.approx((N - 1) * T)
+
+
 def test_what_never_rises_or_settles_has_no_value() -> None:
+    with pytest.raises(NotMeasured, match="no samples"):
+        measured("overshoot", response(TIME), **{"from": 9.0})
+    with pytest.raises(NotMeasured, match="no step to make"):
+        measured("overshoot", response(np.ones(N)))
     with pytest.raises(NotMeasured, match="never reaches"):
         measured("rise-time", response(np.minimum(TIME, 0.5)))
     with pytest.raises(NotMeasured, match="has not settled"):
@@ -93,6 +118,11 @@ def test_what_never_rises_or_settles_has_no_value() -> None:
 def test_steady_state_error_is_the_mean_of_the_end() -> None:
     run = errors(np.where(TIME < 1.9, 9.0, -0.25 + 0.1 * np.sign(np.sin(2 * np.pi * (TIME + T / 2) / 0.02))))
     assert measured("steady-state-error", run) == pytest.approx(0.25, abs=1e-12)
+    numbered = errors(np.arange(float(N)))
+    assert measured("steady-state-error", numbered) == 1949.5, "the last 100 samples"
+    assert measured("steady-state-error", numbered, last=0.01, until=0.3) == 294.5, "samples 290 to 299"
+    with pytest.raises(NotMeasured, match="ended before"):
+        measured("steady-state-error", numbered, until=9.0)
 
 
 def test_effort_and_saturation_of_a_square_wave() -> None:
@@ -110,6 +140,10 @@ def test_disturbance_counts_from_its_start_and_recovery_from_the_last_time_outsi
     assert measured("recovery-time", run, within=3.0) == 0.0
     with pytest.raises(NotMeasured, match="not recovered"):
         measured("recovery-time", run, within=1e-6)
+    with pytest.raises(NotMeasured, match="not recovered"):
+        measured("recovery-time", errors(np.zeros(N), facts={"disturbed_from": 9.0}), within=0.1)
+    at_once = errors(np.where(np.arange(N) == 300, 5.0, 0.0), facts={"disturbed_from": 0.3})
+    assert measured("recovery-time", at_once, within=0.1) == pytest.approx(T), "its first sample counts"
 
 
 def test_noise_counts_for_the_axis_itself_and_in_the_voltage() -> None:
@@ -123,13 +157,14 @@ def test_noise_counts_for_the_axis_itself_and_in_the_voltage() -> None:
     assert measured("noise-error", run_of(table)) == pytest.approx(0.3, rel=1e-12)
     assert measured("noise-voltage", run_of(table)) == pytest.approx(0.6, rel=1e-12)
     assert measured("max-error", run_of(table)) == 0.3
+    assert measured("max-error", run_of({**table, "X_reference": np.ones(N)})) == 1.3
 
 
 def test_lagging_on_a_circle_is_no_contour_error_and_a_smaller_circle_is() -> None:
     from rds.grading.cases import CaseRun
     from rds.results import Result
 
-    def circle(radius: float, lag: float) -> CaseRun:
+    def circle(radius: float, lag: float, **noise: Any) -> CaseRun:
         wanted, there = np.pi * TIME, np.pi * TIME - lag
         columns = {
             "time": TIME,
@@ -138,12 +173,15 @@ def test_lagging_on_a_circle_is_no_contour_error_and_a_smaller_circle_is() -> No
             "X_measured": radius * np.cos(there),
             "Y_measured": radius * np.sin(there),
         }
-        return CaseRun("circle", 0, Result(columns, {}, {"axes": ["X", "Y"], "sample_period": T}))
+        columns |= {"contour_error": np.full(N, 0.7)} if noise else {}
+        return CaseRun("circle", 0, Result(columns, {}, {"axes": ["X", "Y"], "sample_period": T}), facts=noise)
 
     assert measured("contour-error", circle(10.0, 0.05), **{"from": 0.1}) < 2e-5  # the chords of the path
     assert measured("contour-error", circle(9.8, 0.05), **{"from": 0.1}) == pytest.approx(0.2, abs=2e-5)
     assert measured("path-followed", circle(9.8, 0.05), tolerance=0.21, **{"from": 0.1}) == 100.0
     assert measured("path-followed", circle(9.8, 0.05), tolerance=0.19, **{"from": 0.1}) == 0.0
+    assert measured("contour-error", circle(9.8, 0.05, noisy=False)) == 0.7, "as the program's run has judged it"
+    assert measured("contour-error", circle(9.8, 0.05, noisy=True), **{"from": 0.1}) == pytest.approx(0.2, abs=2e-5)
     with pytest.raises(NotMeasured, match="two linear axes"):
         measured("contour-error", errors(np.ones(N)))
 
@@ -161,6 +199,12 @@ def test_work_is_events_per_sample_or_why_there_are_none() -> None:
     assert measured("work", errors(np.ones(10), counts=WorkCounts(1, 190), rows=np.zeros((19, 3, 1)))) == 10.0
     with pytest.raises(NotMeasured, match="tampered"):
         measured("work", errors(np.ones(10), counts=WorkCounts(10, refused="it has tampered with the counter")))
+
+
+def test_more_is_better_of_margins_and_shares_only() -> None:
+    better = {name for name in KINDS.names() if not KINDS.module(name).MORE_IS_WORSE}
+    margins = {"damping", "gain-margin", "modulus-margin", "phase-margin"}
+    assert better == margins | {"model-fit", "path-followed", "unit-tests"}
 
 
 def test_every_criterion_says_what_it_measures() -> None:

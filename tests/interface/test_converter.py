@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis.strategies import floats, integers
 
 from rds.core.errors import ContractError
-from rds.machines.converter import as_voltage, converter
-from rds.machines.encoder import encoder
+from rds.machines.converter import as_voltage, converted, converter, limits
+from rds.machines.encoder import counted, encoder
 
 STEP = 20.0 / 4096
 
@@ -131,3 +131,20 @@ def test_a_model_that_diverged_is_named_by_the_encoder(position: float) -> None:
     assert measure is not None
     with pytest.raises(ContractError, match=r"position became .*must stay finite"):
         measure(position)
+
+
+@given(u=floats(-1e6, 1e6) | floats(allow_nan=False, allow_infinity=False), bits=integers(2, 24))
+def test_what_compiled_loops_use_gives_the_same(u: float, bits: int) -> None:
+    for saturation in (True, False):
+        for quantization in (True, False):
+            effects = {"saturation": saturation, "quantization": quantization}
+            assert converted(u, *limits(10.0, bits, **effects)) == converter(10.0, bits, **effects)(u)
+    if abs(u) <= 1e6:
+        measure = encoder(0.01)
+        assert measure is not None and counted(u, 0.01) == measure(u) and abs(counted(u, 0.01) - u) < 0.00501
+    assert counted(u, 0.0) == u and encoder(0.01, quantization=False) is None
+
+
+def test_without_saturation_the_levels_go_on() -> None:
+    convert = converter(10.0, 12, saturation=False)
+    assert [convert(u) for u in (12.3, -12.3, STEP * 2.6)] == [2519 * STEP, -2519 * STEP, 3 * STEP]

@@ -100,3 +100,32 @@ def test_only_the_path_near_the_motion_counts() -> None:
         found, nearest = contour_error(p, path, np.array([segment]), np.array([0.1]))
         assert nearest[0] == segment
         assert abs(found[0] - expected) < 1e-12
+
+
+def test_a_point_far_behind_or_ahead_of_its_reference_belongs_to_the_segment_where_it_is() -> None:
+    path = chain(*(line((k, 0, 0), (k + 1, 0, 0), 10.0) for k in range(10)))
+    p = np.array([[2.4, 0.3, 0.0], [7.4, -0.3, 0.0]])
+    found, nearest = contour_error(p, path, np.array([7, 2]), np.full(2, 5.0))
+    assert nearest.tolist() == [2, 7] and np.abs(found - 0.3).max() < 1e-12
+
+
+def test_a_circle_is_as_long_as_its_arc_and_earlier_turns_do_not_count() -> None:
+    """From start to end of a full circle there is no way at all: four turns would all be near each other."""
+    turns = chain(*(arc((10, 0, 0), (10, 0, 0), (0, 0), 10.0) for _ in range(4)))
+    found, nearest = contour_error(np.array([[-10.1, 0.0, 0.0]]), turns, np.array([3]), np.array([0.1]))
+    assert nearest[0] in (2, 3) and abs(found[0] - 0.1) < 1e-12
+
+
+def test_an_arc_that_ends_off_its_circle_goes_there_evenly() -> None:
+    uneven = arc((10, 0, 0), (0, 10.01, 0), (0, 0), 10.0)
+    middle = points_at(uneven, np.array([0.5]))[:, :3]
+    found, _ = contour_error(middle, uneven, np.zeros(1, int), np.full(1, 1.0))
+    assert found[0] < 1e-12 and abs(middle[0, 1] - middle[0, 0] - 0.005) < 1e-12
+
+
+def test_near_the_axis_of_a_helix_the_turn_that_is_nearest_is_found() -> None:
+    """There all directions are nearly as far, and the turn and angle that the axis suggests are not the nearest."""
+    helix = arc((1, 0, 0), (np.cos(2.1), np.sin(2.1), 2.6557), (0, 0), 10.0, turns=3)
+    p = np.array([[0.000164, 0.000064, height] for height in np.linspace(0.2, 2.4, 12)])
+    found, _ = contour_error(p, helix, np.zeros(12, int), np.full(12, 100.0))
+    assert (found <= 1.001 * brute(p, helix)[0]).all(), "of all turns, and not 2 % farther off"

@@ -54,6 +54,7 @@ def test_fit_by_hand() -> None:
 @given(st.floats(-1e3, 1e3), st.integers(1, 50))
 def test_a_measured_response_that_never_moves_has_no_fit(value: float, samples: int) -> None:
     assert fit_percent(np.full(samples, value), np.zeros(samples)) is None
+    assert fit_percent(np.array([0.0, 1e-200]), np.zeros(2)) is None, "its square is no number above 0"
 
 
 def test_the_first_period_is_left_out() -> None:
@@ -106,10 +107,13 @@ def test_without_a_reference_there_is_no_tracking_error() -> None:
     columns = {"time": [0.0, 0.1], "X_voltage": [1.0, 1.0], "X_measured": [0.0, 1.0]}
     assert Result(columns, meta=meta).metrics == {"X": {}}
     assert Result({**columns, "X_modelled": [0.0, 1.0]}, meta=meta).metrics == {"X": {"fit_percent": 100.0}}
+    unmeasured = {"time": [0.0, 0.1, 0.2], "X_reference": [0.0, 1.0, 0.0], "X_modelled": [0.0, 1.0, 0.0]}
+    result = Result(unmeasured, meta={**meta, "period": {"X": 0.1}})
+    assert result.metrics == {"X": {}} and metric_notes(result) == []
 
 
 def test_metrics_are_json_without_nan() -> None:
-    empty = of([])
+    empty = of([], X_modelled=[])
     huge = of([1e200, -1e200], X_modelled=[1e308, -1e308])
     for result in (empty, huge, make_result("implementation", "XY")):
         json.dumps(result.metrics, allow_nan=False)

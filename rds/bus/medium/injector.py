@@ -18,7 +18,7 @@ class Injector(Generic[Node]):
         self._medium = medium
         self._note = note
         self._lifts: dict[tuple[Node, str], tuple[object, Callable[[int], None]]] = {}
-        self._owners: dict[object, bool] = {}  # those that still want their faults
+        self._waiting: dict[object, object] = {}  # owners of the faults whose time has not come, by a token of each
 
     def inject(self, faults: Sequence[Fault], now: int, owner: object = None) -> None:
         """Inject `faults`, each at its time after `now` (ns). Those of an `owner` end with withdraw(owner).
@@ -33,29 +33,29 @@ class Injector(Generic[Node]):
                 )
             if fault.at == 0:
                 self._check_names(fault)
-        if owner is not None:
-            self._owners[owner] = True
         for fault in faults:
             if fault.at == 0:
                 self._begin(fault, owner, now)
             else:
-                self._medium.at(now + round(fault.at * SECOND), partial(self._begin_later, fault, owner))
+                token = object()
+                self._waiting[token] = owner
+                self._medium.at(now + round(fault.at * SECOND), partial(self._begin_later, fault, token))
 
     def withdraw(self, owner: object, now: int) -> None:
-        """End what `owner` has injected; None: all. Who is dead stays dead."""
-        if owner is None:
-            self._owners.clear()
-        else:
-            self._owners.pop(owner, None)
+        """End what `owner` has injected, what is still to come too; None: all. Who is dead stays dead."""
+        for token, its_owner in list(self._waiting.items()):
+            if owner is None or its_owner is owner:
+                del self._waiting[token]
         self._medium.frame_faults.disarm(owner)
         for key, (its_owner, lift) in list(self._lifts.items()):
             if owner is None or its_owner is owner:
                 del self._lifts[key]
                 lift(now)
 
-    def _begin_later(self, fault: Fault, owner: object, time: int) -> None:
-        if owner is not None and owner not in self._owners:
+    def _begin_later(self, fault: Fault, token: object, time: int) -> None:
+        if token not in self._waiting:
             return
+        owner = self._waiting.pop(token)
         try:
             self._check_names(fault)
             self._begin(fault, owner, time)

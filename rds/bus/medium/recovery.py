@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from rds.bus.medium.confinement import RECOVERY
-from rds.bus.medium.fault_kinds import ENDLESS
 from rds.bus.medium.station import Station
 
 
@@ -39,12 +38,11 @@ class Recovery:
         for station in self._stations:
             seen = max(0, time - self._since(station)) // self._sequence
             station.recovering -= min(seen, station.recovering)
-            station.recovery_from = time
         return self._settle()
 
     def time(self) -> int:
-        """When the first of them has seen enough if the bus stays free."""
-        return min((self._complete(station) for station in self._stations), default=ENDLESS)
+        """When the first of those that recover has seen enough if the bus stays free."""
+        return min(map(self._complete, self._stations))
 
     def reached(self, time: int) -> list[Station]:
         """It stayed free until `time`; returns those that have seen enough."""

@@ -40,7 +40,6 @@ def _from_references(run: CaseRun) -> np.ndarray:
     path = np.zeros(len(result) - 1, SEGMENT)
     path["plane"] = LINE
     path["start"][:, :3], path["end"][:, :3] = wanted[:-1], wanted[1:]
-    path["length"] = np.linalg.norm(wanted[1:] - wanted[:-1], axis=1)
     segment = np.clip(np.arange(len(result)) - 1, 0, len(path) - 1)
     reach = np.linalg.norm(points - wanted, axis=1) + 1e-3
     return contour_error(points, path, segment, reach)[0]

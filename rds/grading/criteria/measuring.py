@@ -117,13 +117,11 @@ def step_of(run: CaseRun, axis: str, options: Options) -> Step:
 
 
 def crossing(step: Step, level: float) -> float:
-    """When the response first reaches this share of the step, s, on the line between two samples."""
+    """When the response first reaches this share of the step (above 0), s, on the line between two samples."""
     reached = np.flatnonzero(step.share >= level)
     if not len(reached):
         raise NotMeasured(f"the response never reaches {100 * level:g} % of the step")
-    k = int(reached[0])
-    if k == 0:
-        return float(step.time[0])
+    k = int(reached[0])  # not 0: there nothing is done yet
     a, b = step.share[k - 1], step.share[k]
     return float(step.time[k - 1] + (level - a) / (b - a) * (step.time[k] - step.time[k - 1]))
 

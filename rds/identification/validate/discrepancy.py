@@ -225,7 +225,7 @@ def clear(off: Off) -> float:
 def _figure(measure: str, model: Mapping[str, float], here: Mapping[str, float], f: float, largest: float) -> float:
     """Model less log of one measure."""
     scale = 1.0 + model.get("viscous", 0.0)
-    (K, tau, delay), (K0, tau0, delay0) = ((v["K"] / scale, v["tau"] / scale, v["delay"]) for v in (model, here))
+    (K, tau, delay), (K0, tau0, delay0) = ((v["K"], v["tau"] / scale, v["delay"]) for v in (model, here))
     w = 2.0 * pi * f
     if measure == "gain":
         ratio = K / K0 * hypot(1.0, w * tau0) / hypot(1.0, w * tau) if K0 != 0.0 else np.inf

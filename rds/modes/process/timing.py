@@ -204,8 +204,6 @@ def own_wait(timing: Timing, period: int) -> np.ndarray:
 
     Periods that were discarded because of it count: the sample that was due is the one after the last taken.
     """
-    if not len(timing.sample):
-        return np.zeros(0)
     start = timing.sample * period + timing.lateness
     due = np.concatenate(([0], (timing.sample[:-1] + 1) * period))
     complete = np.concatenate(([0], timing.sample[:-1] * period + timing.total[:-1]))
@@ -254,7 +252,7 @@ def _is_proven(work: np.ndarray, timing: Timing, period: int, stalls: int, envir
     if max(computing_times(environment.get("instructions", {})), default=0.0) > BEYOND * period:
         return True
     longest = environment.get("rehearsal", {}).get("lateness_max", np.inf if stalls else 0.0) * 1e3
-    longest = max(longest, float(own_wait(timing, period).max(initial=0.0)), float(timing.taken.max(initial=0)))
+    longest = max(longest, float(own_wait(timing, period).max()), float(timing.taken.max()))
     longest += (environment.get("stolen_ticks") or 0) * TICK * 1e9
     return bool(work.max() > period + BEYOND * longest)
 
@@ -277,7 +275,7 @@ def _whose(timing: Timing) -> str:
     referring = float(timing.interpolate.sum())
     if not referring:
         return "control() and the model"
-    share = referring / max(float((timing.interpolate + timing.compute + timing.model).sum()), 1.0)
+    share = referring / float((timing.interpolate + timing.compute + timing.model).sum())
     return f"the interpolator ({share:.0%} of it), control() and the model"
 
 
