@@ -127,7 +127,7 @@ def test_points_lost_only_in_hidden_criteria_are_said_to_be_lost_there(assignmen
     lost = score("hidden", 0.0, 20.0, visible=False, sentence="secret 0.23 mm")
     full = score("rms", 10.0)
     page = feedback_page(assignment, grade("ada", Status.OK, full, lost), [run_with(0.01)])
-    assert "hidden criteria, whose values are not shown, were not met in full" in page and "secret" not in page
+    assert "hidden criteria, which were not met in full" in page and "secret" not in page
     assert "not met in full" not in feedback_page(assignment, grade("ada", Status.OK, full), [run_with(0.01)])
     unknown = replace(lost, band=Band.REVIEW, value=None)  # nobody knows whether it was met
     assert "not met in full" not in feedback_page(assignment, grade("ada", Status.OK, full, unknown))
