@@ -383,7 +383,7 @@ OCTAVE = b"# Created by Octave 8.4.0\n" + b"".join(
 @pytest.mark.parametrize(
     ("name", "data", "said"),
     [
-        ("log.csv", gzip.compress(b"t,u\n" + b"1,2\n" * 30), "packed by gzip"),
+        ("log.csv", gzip.compress(b"t,u\n" + b"1,2\n" * 30, mtime=0), "packed by gzip"),
         ("log.csv", b"PK\x03\x04" + bytes(40) + b"\n" + bytes(9), "a zip, as spreadsheets"),
         ("log.txt", b"PAR1" + bytes(40), "it is Parquet: let its name end in .parquet"),
         ("log.mat", b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n", "git lfs pull"),
@@ -391,8 +391,8 @@ OCTAVE = b"# Created by Octave 8.4.0\n" + b"".join(
         ("log.mat", OCTAVE, "save -v7 log.mat t u y"),
         ("log.txt", OCTAVE, "save -v7 log.mat t u y"),
         ("log.trc", b"#9000002000WAVEDESC" + bytes(40), "a waveform of an oscilloscope"),
-        ("log.csv.gz", gzip.compress(b"t,u\n" + b"1,2\n" * 30), "only bus logs .*gunzip -k FILE"),
-        ("log.json.gz", gzip.compress(b"{}"), "only bus logs .*gunzip -k FILE"),
+        ("log.csv.gz", gzip.compress(b"t,u\n" + b"1,2\n" * 30, mtime=0), "only bus logs .*gunzip -k FILE"),
+        ("log.json.gz", gzip.compress(b"{}", mtime=0), "only bus logs .*gunzip -k FILE"),
         ("log.log", b"TLOG0003\0" + bytes(range(256)) * 9, "it is not text"),
         ("log.txt", b'[{"t":0.0,"u":2.0},{"t":0.1,"u":2.0}]', "it is JSON: in Python `pandas.read_json.FILE"),
     ],
