@@ -18,15 +18,12 @@ MOVING = (0, 6)  # of `program_state`, where a part program moves the axes: it r
 ERROR_METRICS = ("mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_abs_error", "rms_error")
 
 
-class _Metrics(dict[str, Any]):
+class _Named(dict[str, Any]):
     """A dict whose KeyError names what there is."""
 
-    def __init__(self, kind: str) -> None:
-        super().__init__()
-        self.kind = kind
-
     def __missing__(self, name: str) -> Any:
-        raise KeyError(f"no {self.kind} {name!r}; this result has {', '.join(self) or 'none'}")
+        kind = "axis" if any(isinstance(each, dict) for each in self.values()) else "metric"
+        raise KeyError(f"no {kind} {name!r}; this result has {', '.join(self) or 'none'}")
 
 
 def axis_metrics(result: Result) -> dict[str, dict[str, float | None]]:
@@ -41,13 +38,11 @@ def axis_metrics(result: Result) -> dict[str, dict[str, float | None]]:
     longer than one period is used whole. Of a part program the samples count in which it moves the axes: waiting,
     holding and dwelling at one place would thin the errors out. `metric_notes` says what is left out.
     """
-    metrics = _Metrics("axis")
-    metrics.update((axis, _one_axis(result, axis)) for axis in result.axes)
-    return metrics
+    return _Named((axis, _one_axis(result, axis)) for axis in result.axes)
 
 
 def _one_axis(result: Result, axis: str) -> dict[str, float | None]:
-    metrics = _Metrics("metric")
+    metrics = _Named()
     used = settled(result, axis)
     error = tracking_error(result, axis)
     if error is not None:
