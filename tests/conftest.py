@@ -51,7 +51,7 @@ settings.register_profile("same", deadline=None, derandomize=True, max_examples=
 settings.register_profile("search", deadline=None)
 settings.load_profile("same")
 
-pytest_plugins = ["held_up", "kernels_first", "skipped"]
+pytest_plugins = ["compiled_first", "held_up", "skipped"]
 
 gc.disable()  # until all tests are collected, which is garbage at the end of the run only
 
