@@ -92,8 +92,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish() -> None:
-    """What was collected is half a million objects, which no later collection of garbage goes through."""
+    """What was collected is half a million objects, which no later collection of garbage goes through; and those that
+    tests make are gone through less often: a twentieth of what they compute.
+    """
     gc.freeze()
+    gc.set_threshold(10_000, 20, 20)
     gc.enable()
 
 
