@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 import signal
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -22,6 +23,7 @@ import typer.testing
 from hypothesis import settings
 
 from rds.bus.tools.mf4 import put_off_asammdf
+from rds.core.run_text import STUDENT_MODULE
 
 # Tests run side by side, and so do their many processes: numpy's threads would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -188,6 +190,17 @@ def ordinary_scheduling() -> Iterator[None]:
     if hasattr(os, "sched_getscheduler") and (scheduler := os.sched_getscheduler(0)) != os.SCHED_OTHER:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         pytest.fail(f"the process of the tests was left with scheduling policy {scheduler}")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forgotten_laws() -> Iterator[None]:
+    """What a file has loaded of students' code is no module any more when the next one begins: with the 20,000 that a
+    worker loads, loading one more takes four times as long, and to pack one for another process a hundred times.
+    """
+    before = set(sys.modules)
+    yield
+    for name in [name for name in sys.modules if name.startswith(STUDENT_MODULE) and name not in before]:
+        del sys.modules[name]
 
 
 @pytest.fixture

@@ -12,6 +12,12 @@ import pytest
 
 from rds.core.load import load_student
 from rds.core.portable import portable
+from rds.core.run_text import STUDENT_MODULE
+
+
+def test_laws_of_the_tests_of_other_files_are_no_modules_any_more() -> None:
+    """See `forgotten_laws` in tests/conftest.py; what the files themselves load as they are imported stays."""
+    assert sum(name.startswith(STUDENT_MODULE) for name in sys.modules) < 20
 
 
 def test_threads_that_pack_at_the_same_time_do_not_disturb_each_other(tmp_path: Path) -> None:
