@@ -11,7 +11,7 @@ import numpy as np
 from rds.checks import clauses
 from rds.checks.values import is_real
 from rds.core.signals import EXAMPLE, signal_values, signals_wanted
-from rds.core.values import shown
+from rds.core.values import is_masked, shown
 
 
 def voltage_fault(answer: Any, axes: int = 0, signals: Sequence[str] = ()) -> tuple[str, str, str] | None:
@@ -25,7 +25,7 @@ def voltage_fault(answer: Any, axes: int = 0, signals: Sequence[str] = ()) -> tu
         return clauses.SIGNALS, said, f"{signals_wanted(signals, axes)}, or take `signals` out of the file"
     if not is_several or len(answer) != (3 if signals else 2):
         return clauses.PAIR, *_no_pair(answer)
-    fault = _array_fault(answer[0], axes) if axes else _number_fault(answer[0])
+    fault = _masked_fault(answer[0]) or (_array_fault(answer[0], axes) if axes else _number_fault(answer[0]))
     return fault or (_signals_fault(answer[2], axes, signals) if signals else None)
 
 
@@ -55,6 +55,12 @@ def _no_pair(answer: Any) -> tuple[str, str]:
             remedy = f"declare the signals beside params, as in {EXAMPLE}"
         return f"{len(answer)} values, {shown(answer)},", remedy
     return shown(answer), "end it with `return voltage, next_state`"
+
+
+def _masked_fault(u: Any) -> tuple[str, str, str] | None:
+    if is_masked(u):
+        return clauses.VOLTAGE, f"the voltage {shown(u)}", "a masked number is none: fill it, or use plain arrays"
+    return None
 
 
 def _number_fault(u: Any) -> tuple[str, str, str] | None:

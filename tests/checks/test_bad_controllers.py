@@ -138,6 +138,14 @@ def boolean(t, r, y, state, params):
     return r.position > y, state
 
 
+def masked_number(t, r, y, state, params):
+    return np.ma.masked_greater(np.ma.array([r.position - y]), 0.05)[0] * 30.0, state
+
+
+def masked_array(t, r, y, state, params):
+    return np.ma.masked_greater(np.ma.array([r.position - y]), 0.05), state
+
+
 def complex_number(t, r, y, state, params):
     return (y + 0j) ** 0.5, state
 
@@ -250,6 +258,8 @@ BAD = [
     (text, clauses.VOLTAGE, "'1.5' (str)"),
     (boolean, clauses.VOLTAGE, "(bool)"),
     (complex_number, clauses.VOLTAGE, "(complex)"),
+    (masked_number, clauses.VOLTAGE, "a masked number is none"),
+    (masked_array, clauses.VOLTAGE, "a masked number is none"),
     (no_number, clauses.VOLTAGE, "None"),
     (array_of_several, clauses.VOLTAGE, "one number"),
     (not_a_number, clauses.VOLTAGE, "nan at t = 0.501 s"),
