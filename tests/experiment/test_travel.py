@@ -60,3 +60,10 @@ def test_a_voltage_that_is_at_its_limit_for_long_is_told(tmp_path: Path, gain: f
     said = f"X: the converter limited the voltage to ±10 V in {share:.0f} % of the samples"
     assert any(note.startswith(said) for note in result.meta["notes"]) is is_told
     assert (share >= 20.0) is is_told
+
+
+def test_a_law_of_the_wrong_sign_is_not_told_to_lower_its_gains(tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_text(LAW.format(error="y - r.position"))
+    reference = {"kind": "sinusoid", "amplitude": 2.0, "frequency": 1.0}
+    (note,) = Experiment(controller=tmp_path / "law.py", reference=reference, duration=2.0).run().meta["notes"]
+    assert note.endswith("it drives the axis off: turn its sign, as in reference minus measurement")

@@ -486,12 +486,14 @@ def test_a_controller_that_ends_the_process(experiment: Maker, alone: Path) -> N
     assert len(result) <= 500
 
 
+@pytest.mark.parametrize("mode", ["emulation", "implementation"])
 def test_what_a_controller_prints_is_kept_apart(
-    experiment: Maker, alone: Path, capfd: pytest.CaptureFixture[str]
+    experiment: Maker, alone: Path, capfd: pytest.CaptureFixture[str], mode: str
 ) -> None:
     talking = experiment(every(100, lambda: print("hello")), duration=0.5)
-    unless_lost(lambda: talking.run("emulation", out=alone / "run"))
-    assert capfd.readouterr().out == ""
+    result = unless_lost(lambda: talking.run(mode, out=alone / "run"))
+    assert capfd.readouterr().out == ""  # nor what the simulation beside an implementation prints
+    assert "what your code printed during the run is in target.log, in the folder of the run" in result.meta["notes"]
     assert (alone / "run" / "target.log").read_text().count("hello") == 5
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import datetime
+import os
 import platform
 import sys
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from math import isclose
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -34,6 +36,8 @@ from rds.results import Result
 
 _CLOSE = 0.006  # mm: as `rds check` has it
 _OFTEN = 20.0  # % of the samples: from here on a voltage at its limit is told
+_QUIET = Lock()  # what threads redirect at once, one would restore to a file that another has closed
+_NEARLY_ALL = 0.9  # of the samples: the law of an axis that runs away by its sign
 _LONGEST = 1024  # bits of an int that is kept as a number: beyond some thousand digits Python does not print it
 
 
@@ -128,11 +132,21 @@ def _at_the_limit(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
             continue  # a relay switches between limits, and says itself what came of it
         share = 100.0 * float(np.mean((voltage <= low) | (voltage >= high)))
         if share >= _OFTEN:
+            remedy = "lower its gains, or ask for a slower or smaller motion"
+            name = part.axis.name
+            reference = columns.get(f"{name}_reference")
+            if reference is not None and _drives_away(voltage, reference - columns[f"{name}_measured"]):
+                remedy = "it drives the axis off: turn its sign, as in reference minus measurement"
             said.append(
                 f"{part.axis.name}: the converter limited the voltage to ±{board.range:g} V in {share:.0f} % of the "
-                "samples, where the law has no effect; lower its gains, or ask for a slower or smaller motion"
+                f"samples, where the law has no effect; {remedy}"
             )
     return said
+
+
+def _drives_away(voltage: np.ndarray, error: np.ndarray) -> bool:
+    """Whether nearly all samples have a voltage against the error, which grows: gains have no part in that."""
+    return bool(np.mean(voltage * error < 0.0) > _NEARLY_ALL and abs(error[-1]) > 0.5 * np.abs(error).max())
 
 
 def _concluded(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
@@ -149,7 +163,8 @@ def _concluded(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
 def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarray]:
     """Each axis's response in a closed loop of its own: the same plan, simulated, for as long as the run lasted."""
     same = replace(as_recorded(plan, rows).unwatched(), mode=SIMULATION, samples=int(sample[-1]) + 1)
-    simulated = run_plan(same, None)
+    with open(os.devnull, "w", encoding="utf-8") as nowhere, _QUIET, redirect_stdout(nowhere):
+        simulated = run_plan(same, None)  # its prints would pass for the run's own, which are in `target.log`
     of = dict(zip(simulated.columns, simulated.values.T, strict=True))
     return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}
 

@@ -36,10 +36,11 @@ from rds.modes.process.live import Live
 from rds.modes.process.machine import BUILTIN, machine_behind
 from rds.modes.process.processes import end_group, is_alive, wait_for_end
 from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
-from rds.modes.process.recorder import PLAN, Recorder, finish, patience
+from rds.modes.process.recorder import LOG, PLAN, Recorder, finish, patience
 from rds.modes.process.ring import Ring
 from rds.modes.process.shared import folders, remove_left
 
+_PRINTED = "what your code printed during the run is in target.log, in the folder of the run"
 _CHUNK = 5000  # samples between two calls of a simulation's progress
 _RING_BYTES = 64 << 20
 _POLL = 0.05  # s
@@ -148,7 +149,8 @@ def _in_target(plan: Plan, directory: Path, lock: int, progress: Progress | None
     ending, reason = Ending(report["ending"]), report.get("reason", "")
     if has_rows:
         values, changes = read_raw(directory)[1], tuple(read_changes(directory))
-        return Rows(columns, units, values, ending, reason, report, tuple(report.get("notes", ())), changes)
+        notes = [*report.get("notes", ()), *([_PRINTED] if (directory / LOG).exists() else ())]
+        return Rows(columns, units, values, ending, reason, report, tuple(notes), changes)
     (directory / UNSTARTED).unlink()
     return Rows(columns, units, np.empty((0, len(columns))), ending, reason, report)
 
