@@ -97,6 +97,8 @@ def test_points_penalty_and_reason_are_said(assignment: Assignment) -> None:
     page = feedback_page(assignment, late)
     assert "20.8 of 30 points" in page
     assert "1.25 days after the due time: 5.2 of the 26 points earned are lost, 20 %; each day that has begun" in page
+    assert "Handed in 1 s after the due time" in feedback_page(assignment, replace(late, late_days=1.1574e-05))
+    assert "Handed in 30 min after" in feedback_page(assignment, replace(late, late_days=0.0208))
     broken = feedback_page(assignment, grade("bob", Status.BROKE_CONTRACT))
     assert "broke the contract" in broken and "control() returned nan at t = 0.5 s" in broken
     ours = feedback_page(assignment, grade("cy", Status.GRADER_ERROR))

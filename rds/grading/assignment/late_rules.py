@@ -58,6 +58,14 @@ def days_late(due: datetime | None, submitted: datetime | None) -> float:
     return moved((submitted - due).total_seconds() / _DAY, 0.0)
 
 
+def told_days(days: float, digits: str = ".3g") -> str:
+    """Days late in words: '1.25 days', and what is less than an hour in minutes or seconds."""
+    seconds = days * _DAY
+    if seconds < 3600.0:
+        return f"{seconds:.0f} s" if seconds < 60.0 else f"{seconds / 60.0:.0f} min"
+    return f"{days:{digits}} days"
+
+
 def moved(days: float, extension: float) -> float:
     """Days late where the due time is `extension` days later; 0 in time."""
     return max(0.0, round(days - extension, _DIGITS))

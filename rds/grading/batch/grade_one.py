@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from rds.grading.assignment.assignment import Assignment
-from rds.grading.assignment.late_rules import days_late
+from rds.grading.assignment.late_rules import days_late, told_days
 from rds.grading.assignment.unit_tests import UnitTest, failing
 from rds.grading.cases.case import Answers, Case, CaseRun
 from rds.grading.criteria.criterion import GATE, UNKNOWN, Criterion
@@ -147,7 +147,7 @@ def grade_with_runs(
     lost = assignment.late.lost(days)
     notes = list(work.notes)
     if lost:
-        notes.append(f"Late by {days:.2f} days: {100 * lost:.3g} % of the points are lost.")
+        notes.append(f"Late by {told_days(days, '.2f')}: {100 * lost:.3g} % of the points are lost.")
     if work.output[False]:
         notes.append(f"It printed:\n{_cut(work.output[False])}")
     made = Grade(

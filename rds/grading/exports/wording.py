@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
+from rds.grading.assignment.late_rules import told_days
 from rds.grading.feedback.plain_text import one_line, plain
 from rds.grading.grade import CriterionScore, Grade, Status
 
@@ -24,7 +25,7 @@ def of_grade(grade: Grade, factor: float = 1.0) -> str:
         return lines[0]
     if grade.late_days > 0.0:
         lost = factor * (grade.before_penalty - grade.score)
-        lines.append(f"{grade.late_days:.3g} days late: {lost:.4g} points are lost.")
+        lines.append(f"{told_days(grade.late_days)} late: {lost:.4g} points are lost.")
     own = "" if factor == 1.0 else f" ({grade.score:.4g} of the {grade.max_score:.4g} points on the feedback page)"
     lines.append(f"{of_most(grade, factor)}{own}.")
     return "\n".join(lines)

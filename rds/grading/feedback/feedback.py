@@ -12,6 +12,7 @@ from html import escape
 from statistics import median
 
 from rds.grading.assignment.assignment import Assignment
+from rds.grading.assignment.late_rules import told_days
 from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.criterion import Criterion
 from rds.grading.feedback import band_bar, histogram
@@ -152,7 +153,7 @@ def _total(grade: Grade) -> str:
     parts = [] if is_excused else [f'<p class="total">{grade.score:.4g} of {grade.max_score:.4g} points</p>']
     lost = grade.before_penalty - grade.score
     if grade.late_days > 0.0 and not is_excused:
-        said = f"Handed in {grade.late_days:.3g} days after the due time: "
+        said = f"Handed in {told_days(grade.late_days)} after the due time: "
         if lost > 0.0:
             said += f"{lost:.4g} of the {grade.before_penalty:.4g} points earned are lost, "
             said += f"{100 * lost / grade.before_penalty:.3g} %; each day that has begun counts."

@@ -133,7 +133,7 @@ def _behind_gates(score: CriterionScore, everybody: Sequence[CriterionScore], gi
     gate = titles[min(gates, key=lambda name: gates[name])] if now < 1.0 else ""
     names = " and ".join(s.title for s in by_hand.values())
     counts = f"{points:g} of {score.max_score:g} points count here, from {score.score:g} as measured"
-    said = f"{score.sentence} {names} was set by hand: {counts}."
+    said = f"{score.sentence} {names} {'was' if len(by_hand) == 1 else 'were'} set by hand: {counts}."
     return replace(score, score=points, band=_band(points, score.max_score), sentence=said, gate=gate)
 
 
