@@ -8,6 +8,7 @@ from html import escape
 from statistics import mean, median
 from urllib.parse import quote
 
+from rds.grading.assignment.late_rules import told_days
 from rds.grading.batch.grades_table import criteria_of
 from rds.grading.feedback import histogram
 from rds.grading.feedback.plain_text import isolated, one_line
@@ -196,7 +197,7 @@ def _slowest(grades: Sequence[Grade], links: Mapping[str, str], seconds: Mapping
 
 def _everybody(grades: Sequence[Grade], links: Mapping[str, str]) -> Iterator[str]:
     criteria = criteria_of(grades)
-    heads = ["student", "status", "score", "late [days]", *(criterion.name for criterion in criteria)]
+    heads = ["student", "status", "score", "late", *(criterion.name for criterion in criteria)]
     texts = ("student", "status")
     kinds = ["" if each in texts else ' class="number"' for each in heads]
     head = "".join(
@@ -216,7 +217,7 @@ def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) ->
     scores = {score.name: score for score in grade.criteria} if is_graded else {}
     cells = [
         _points(grade.score) if is_graded else "–",
-        f"{grade.late_days:.2g}" if grade.late_days else "",
+        told_days(grade.late_days, ".2g") if grade.late_days else "",
     ]
     numbers = "".join(f'<td class="number">{each}</td>' for each in cells)
     numbers += "".join(_cell(scores.get(name)) for name in criteria)

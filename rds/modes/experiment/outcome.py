@@ -131,16 +131,19 @@ def _at_the_limit(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
         if part.controller is not None and part.controller.conclude is not None:
             continue  # a relay switches between limits, and says itself what came of it
         share = 100.0 * float(np.mean((voltage <= low) | (voltage >= high)))
-        if share >= _OFTEN:
-            remedy = "lower its gains, or ask for a slower or smaller motion"
-            name = part.axis.name
-            reference = columns.get(f"{name}_reference")
-            if reference is not None and _drives_away(voltage, reference - columns[f"{name}_measured"]):
-                remedy = "it drives the axis off: turn its sign, as in reference minus measurement"
+        name, reference = part.axis.name, columns.get(f"{part.axis.name}_reference")
+        if share < _OFTEN:
+            continue
+        if reference is not None and _drives_away(voltage, reference - columns[f"{name}_measured"]):
             said.append(
-                f"{part.axis.name}: the converter limited the voltage to ±{board.range:g} V in {share:.0f} % of the "
-                f"samples, where the law has no effect; {remedy}"
+                f"{name}: the law drives the axis off, with the voltage at ±{board.range:g} V in {share:.0f} % of the "
+                "samples; turn its sign: the error is the reference minus the measurement"
             )
+            continue
+        said.append(
+            f"{name}: the converter limited the voltage to ±{board.range:g} V in {share:.0f} % of the "
+            "samples, where the law has no effect; lower its gains, or ask for a slower or smaller motion"
+        )
     return said
 
 
