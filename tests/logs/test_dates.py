@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from rds.core.errors import InputError
+from rds.identification.logs.csv_layout import HEAD
 from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis, headed
 
@@ -226,3 +227,13 @@ def test_the_day_before_the_month_is_read_on_any_day(tmp_path: Path, day: int) -
     path.write_text("\n".join(["time,u_V,y_mm", *rows]) + "\n")
     (log,) = read_log(path)
     assert np.allclose(log.time, 1e-3 * np.arange(300), atol=1e-9)
+
+
+def test_hours_of_one_digit_may_begin_at_midnight(tmp_path: Path) -> None:
+    """Far behind the rows by which the forms of a file are told."""
+    begin, path = datetime(2024, 5, 1, 23, 59, 0), tmp_path / "log.csv"
+    at = [begin + timedelta(milliseconds=20 * k) for k in range(4000)]
+    rows = (f"{t.hour}:{t:%M:%S.%f},{k % 7},{k},a word of the recorder" for k, t in enumerate(at))
+    path.write_text("\n".join(["time,u_V,y_mm,word", *rows]) + "\n")
+    (log,) = read_log(path)
+    assert path.stat().st_size > 2 * HEAD and np.allclose(log.time, 2e-2 * np.arange(4000), atol=1e-9)

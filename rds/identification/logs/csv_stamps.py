@@ -87,7 +87,7 @@ _COMMA_TIME = _Rule(re.compile(rb"(?<!\d)(\d{1,2}:\d\d:\d\d),(\d)"), rb"\1.\2")
 
 
 def rules(sample: bytes, delimiter: str) -> Sequence[_Rule]:
-    """The rules that change something in the first rows of a file; the others are not worth their time.
+    """The rules that change something in the first and last rows of a file; the others are not worth their time.
 
     A rule that joins cells is none for this file: there date, time and PM stand in columns of their own.
     """
