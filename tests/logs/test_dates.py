@@ -196,6 +196,8 @@ def test_the_exponents_of_fortran_are_numbers(tmp_path: Path) -> None:
     path.write_text("time [s],voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
     (log,) = read_log(path)
     assert np.allclose(log.time, 1e-3 * np.arange(300)) and np.array_equal(log.position, 1.5 * np.arange(300))
+    path.write_text(path.read_text().replace(",", ";").replace(".", ","))
+    assert np.array_equal(read_log(path)[0].position, log.position)
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ _RULES = (
     ),
     _Rule(re.compile(rb"(?<![\d:.])(\d:\d\d:\d\d)(?![\d:])"), rb"0\1"),
     # the exponents of Fortran's double precision; 1D5 may be a number to the base of 16
-    _Rule(re.compile(rb"(?<=\d)(\.\d*)[dD]([+-]\d{2,3})(?![\w.])"), rb"\1E\2"),
+    _Rule(re.compile(rb"(?<=\d)([.,]\d*)[dD]([+-]\d{2,3})(?![\w.])"), rb"\1E\2"),
 )
 _COMMA_TIME = _Rule(re.compile(rb"(?<!\d)(\d{1,2}:\d\d:\d\d),(\d)"), rb"\1.\2")
 
