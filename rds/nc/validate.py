@@ -285,10 +285,14 @@ class Validator:
             here = at_line == line
             fastest = float(rate[too_fast[here]].max())
             feed, remedy = f"a feed of {plain(fastest * 60)} {unit} is", "lower it"
+            follows = bool(np.any(self._follow[too_fast[here]]))
             if np.any(given[here] == BY_PITCH):
-                feed, remedy = f"the pitch times the speed of the spindle is {plain(fastest * 60)} {unit},", "lower S"
+                feed = f"the pitch and the speed of the spindle make a feed of {plain(fastest * 60)} {unit},"
+                remedy = "lower S"
+            elif follows:
+                remedy = "lower F and S by the same factor, which keeps the pitch"
             said = f"{feed} more than {who} ({plain(limit * 60)})"
-            if self._machine.limit_feed and kind != "tool" and not np.any(self._follow[too_fast[here]]):
+            if self._machine.limit_feed and kind != "tool" and not follows:
                 found = ProgramError(f"{said}, and is limited to it", file=block.file or self._name, line=int(line))
                 self.warn(found, _FEED_WORDS)
             else:

@@ -84,6 +84,8 @@ def test_points_by_hand_open_and_close_what_needs_them() -> None:
     assert found.score == 0.0 and found.criteria[1].gate == "Error rms" and found.criteria[1].band is Band.NONE
     assert reviewed(full, LATE, None, [points(5.0)]).criteria[1] == full.criteria[1]
     assert reviewed(found, LATE, None, [points(6.0)]).score == 14.0  # the best of attempts is reviewed once more
+    given = reviewed(shut, LATE, None, [points(3.0, criterion="effort")])
+    assert reviewed(given, LATE, None, [points(10.0)]).criteria[1].score == 3.0  # what a grader gave stays there
     two = replace(behind("effort", 0.0), gates={"rms": 0.0, "hidden": 0.5})
     found = reviewed(grade("ada", Status.OK, score(points=0.0), score("hidden", 1.0), two), LATE, None, [points(9.0)])
     assert (found.criteria[2].score, found.criteria[2].gate) == (4.0, "Error hidden")
@@ -97,6 +99,12 @@ def test_the_command_says_what_else_points_by_hand_change(tmp_path: Path) -> Non
     )
     lines = told.output.splitlines()
     assert lines == ["entry 1: points of ada, by ann", "  Error effort needs it: 8 points, from 0 as measured"]
+    old = grade("eve", Status.OK, score(points=0.0), score("effort", 0.0, gate="Error rms"))  # of an earlier version
+    out = made(tmp_path / "old", old)
+    told = CliRunner().invoke(
+        app, ["grade", "review", str(out), "--student", "eve", "--criterion", "rms", "--points", "9", "--by", "ann"]
+    )
+    assert told.output.splitlines()[1] == "  Error effort needs it and keeps 0 points; set them by hand, too"
 
 
 def test_two_graders_count_by_their_mean_until_a_final_word() -> None:

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from rds.core.errors import InputError
+from rds.identification.logs.csv_layout import HEAD
 from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis, headed
 
@@ -168,7 +169,8 @@ def test_dates_and_times_that_can_mean_one_thing_are_read(tmp_path: Path, form: 
     [
         ("11:59:59:90", "11:59:59:91"),  # frames of a film, or hundredths
         ("13:59:59.900 PM", "13:59:59.901 PM"),
-        ("31/12/2024 11:59:59.900", "31/12/2024 11:59:59.901"),
+        ("31/31/2024 11:59:59.900", "31/31/2024 11:59:59.901"),
+        ("12/05/2024 23:59:59.999", "13/05/2024 00:00:00.000"),  # the second tells what the first is
         ("03/04/2024 23:59:59.999", "04/04/2024 00:00:00.000"),  # a day later, or a month
     ],
 )
@@ -194,3 +196,46 @@ def test_the_exponents_of_fortran_are_numbers(tmp_path: Path) -> None:
     path.write_text("time [s],voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
     (log,) = read_log(path)
     assert np.allclose(log.time, 1e-3 * np.arange(300)) and np.array_equal(log.position, 1.5 * np.arange(300))
+    path.write_text(path.read_text().replace(",", ";").replace(".", ","))
+    assert np.array_equal(read_log(path)[0].position, log.position)
+
+
+@pytest.mark.parametrize(
+    ("form", "mark"),
+    [
+        ("%m/%d/%Y, %H:%M:%S.%f", ", "),
+        ("%d.%m.%Y, %H:%M:%S.%f", ", "),
+        ("%d-%b-%Y, %H:%M:%S.%f", ", "),
+        ("%d %b %Y %H:%M:%S.%f", " "),
+        ("%H:%M:%S.%f PM", " "),
+    ],
+)
+def test_a_date_in_a_column_of_its_own_stays_there(tmp_path: Path, form: str, mark: str) -> None:
+    begin = datetime(2024, 5, 21, 12, 59, 58)
+    stamps = [(begin + timedelta(milliseconds=10 * k)).strftime(form) for k in range(300)]
+    names = mark.join("time" if "%H" in part else f"word{k}" for k, part in enumerate(form.split(mark)))
+    rows = (mark.join([stamp, str(k % 7), str(k)]) for k, stamp in enumerate(stamps))
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([mark.join([names, "u_V", "y_mm"]), *rows]) + "\n")
+    (log,) = read_log(path)
+    assert np.allclose(log.time, 1e-2 * np.arange(300), atol=1e-9) and log.command[5] == 5.0
+
+
+@pytest.mark.parametrize("day", [5, 13, 31])
+def test_the_day_before_the_month_is_read_on_any_day(tmp_path: Path, day: int) -> None:
+    begin = datetime(2024, 5, day, 12, 0, 0)
+    rows = (f"{begin + timedelta(milliseconds=k):%d/%m/%Y %H:%M:%S.%f},{k % 7},{k}" for k in range(300))
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time,u_V,y_mm", *rows]) + "\n")
+    (log,) = read_log(path)
+    assert np.allclose(log.time, 1e-3 * np.arange(300), atol=1e-9)
+
+
+def test_hours_of_one_digit_may_begin_at_midnight(tmp_path: Path) -> None:
+    """Far behind the rows by which the forms of a file are told."""
+    begin, path = datetime(2024, 5, 1, 23, 59, 0), tmp_path / "log.csv"
+    at = [begin + timedelta(milliseconds=20 * k) for k in range(4000)]
+    rows = (f"{t.hour}:{t:%M:%S.%f},{k % 7},{k},a word of the recorder" for k, t in enumerate(at))
+    path.write_text("\n".join(["time,u_V,y_mm,word", *rows]) + "\n")
+    (log,) = read_log(path)
+    assert path.stat().st_size > 2 * HEAD and np.allclose(log.time, 2e-2 * np.arange(4000), atol=1e-9)

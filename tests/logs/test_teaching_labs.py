@@ -33,8 +33,8 @@ def test_a_heading_of_rpm_is_a_speed_with_its_unit(tmp_path: Path, name: str) ->
     assert np.allclose(log.extra["reference"], V + 5.0, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", ["erpm", "max_rpm", "electrical_rpm"])
-def test_an_electrical_speed_or_a_bound_is_not_the_axis_s(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize("name", ["erpm", "max_rpm", "electrical_rpm", "theta_elec_rad"])
+def test_what_is_electrical_or_a_bound_is_not_the_axis_s(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match="no column tells by its unit that it is the position"):
         read_log(written(tmp_path, f"t_s,u_V,{name}", [T, U, V]))
 

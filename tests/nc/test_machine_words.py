@@ -97,11 +97,14 @@ def test_a_feed_above_an_axis_is_limited_with_a_note_where_the_machine_says_so(t
     assert speed == pytest.approx(limits.velocity, rel=0.002)
 
 
-@pytest.mark.parametrize(("moves", "line"), [("G0 Z1\nG33 Z-10 K1", 4), ("G0 Z1\nG84 Z-20 R1 F1000", 4)])
-def test_a_thread_or_tap_is_never_limited_to_another_pitch(tmp_path: Path, moves: str, line: int) -> None:
+@pytest.mark.parametrize(
+    ("moves", "remedy"),
+    [("G0 Z1\nG33 Z-10 K1", "; lower S"), ("G0 Z1\nG84 Z-20 R1 F1000", "; lower F and S by the same factor")],
+)
+def test_a_thread_or_tap_is_never_limited_to_another_pitch(tmp_path: Path, moves: str, remedy: str) -> None:
     part = program(tmp_path, f"G21 F900\nM3 S1000\n{moves}\nG80 G1 X1 F900\nM5\nM2\n")
     result, _ = check_program(part, machine_with(tmp_path, "limit_feed = true"), Setup())
-    assert [fault.line for fault in result.faults] == [line]
+    assert [fault.line for fault in result.faults] == [4] and remedy in result.faults[0].reason
     assert [warning.line for warning in result.warnings if "is limited to it" in warning.reason] == [5]
 
 

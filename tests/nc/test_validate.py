@@ -117,7 +117,7 @@ def test_a_valid_program_and_what_is_told_of_it(tmp_path: Path) -> None:
         ("F781\nG2 X1 Y1 I0.5 J0.5\n", (1, 1, "F781"), "781 mm/min is more than X, the slowest axis that moves"),
         ("G93\nG1 X10 F79\n", (2, 8, "F79"), "790 mm/min is more than X"),
         ("S1000 M3\nG95\nG1 Z1 F0.67\n", (3, 7, "F0.67"), "670 mm/min"),
-        ("F60\nM3 S1000\nG33 Z-1 K1\n", (3, 1, "G33"), "times the speed of the spindle is 1000 mm/min, more than Z"),
+        ("F60\nM3 S1000\nG33 Z-1 K1\n", (3, 1, "G33"), "speed of the spindle make a feed of 1000 mm/min, more than Z"),
         ("T1 M6\nF401\nG1 X1\n", (2, 1, "F401"), "401 mm/min is more than the tool table allows tool 1 (400)"),
         ("S10001\nM3\n", (2, 1, "M3"), "10001 rev/min is outside of what the spindle does (-10000 to 10000"),
         ("M4\nS10001\n", (2, 1, "S10001"), "10001 rev/min counter-clockwise is outside"),

@@ -41,8 +41,8 @@ _NOTHING_RAN = (Status.MISSING, Status.REFUSED, Status.FAILED_TO_LOAD)
 _OF_ERRORS, _OF_STEPS = "rds.grading.feedback.causes_of_errors", "rds.grading.feedback.causes_of_steps"
 _OF_LOOPS, _OF_OTHERS = "rds.grading.feedback.causes_of_loops", "rds.grading.feedback.causes_of_others"
 _UNSEEN = (
-    "All that is explained on this page has full points. The points that are missing belong to hidden criteria, which "
-    "were not met in full; their values are not shown."
+    "Everything that was measured and is explained on this page has full points. Points are missing in hidden "
+    "criteria, which were not met in full; their values are not shown."
 )
 CAUSES: Mapping[str, str] = MappingProxyType(
     {

@@ -109,7 +109,9 @@ def _marked(score: CriterionScore, marks: Sequence[Entry]) -> CriterionScore:
     said = (
         f"{score.sentence} Set by hand to {points:g} of {score.max_score:g} points, from {score.score:g} as measured."
     )
-    return replace(score, score=points, band=_band(points, score.max_score), sentence=said.strip(), gate="")
+    band = _band(points, score.max_score)
+    # no gate takes what a grader gives, nor where this grade is the best of several attempts and is reviewed again
+    return replace(score, score=points, band=band, sentence=said.strip(), gate="", ungated=None, gates={})
 
 
 def _behind_gates(score: CriterionScore, everybody: Sequence[CriterionScore], given: Set[str]) -> CriterionScore:

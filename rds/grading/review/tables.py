@@ -30,11 +30,13 @@ def behind(finished: Finished, entry: Entry) -> list[str]:
     for grade in finished.grades:
         if entry.kind is Kind.POINTS and entry.student in (grade.student, finished.of[grade.student]):
             before = {score.name: score.score for score in finished.measured[finished.of[grade.student]].criteria}
-            said += [
-                f"{score.title} needs it: {score.score:g} points, from {before[score.name]:g} as measured"
-                for score in grade.criteria
-                if entry.criterion in score.gates and score.score != before[score.name]
-            ]
+            gate = next((score.title for score in grade.criteria if score.name == entry.criterion), "")
+            for score in grade.criteria:
+                if entry.criterion in score.gates and score.score != before[score.name]:
+                    change = f"{score.score:g} points, from {before[score.name]:g} as measured"
+                    said.append(f"{score.title} needs it: {change}")
+                elif score.gate == gate != "" and not score.gates:  # earlier versions did not keep what gates took
+                    said.append(f"{score.title} needs it and keeps {score.score:g} points; set them by hand, too")
     return said
 
 

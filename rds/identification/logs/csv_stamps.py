@@ -2,7 +2,7 @@
 
 Only forms that can mean one thing are turned. `03/04/2024` may be of March or April: it is taken for the American date,
 and the reader refuses a log of more than two days. Within one day the order does not matter, and at midnight the other
-order would be a month off.
+order would be a month off. `13/04/2024` can be of April alone.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
+
+from rds.identification.logs.csv_cells import split
 
 _MONTHS = (b"jan", b"feb", b"mar", b"apr", b"may", b"jun", b"jul", b"aug", b"sep", b"oct", b"nov", b"dec")
 _MONTH = rb"(" + b"|".join(_MONTHS) + rb")[a-z]{0,6}"
@@ -33,6 +35,11 @@ def _day(year: bytes, month: int, day: bytes) -> bytes:
 
 def _month(name: bytes) -> int:
     return _MONTHS.index(name.lower()) + 1
+
+
+def _slashed(found: re.Match[bytes]) -> bytes:
+    month, day = sorted((found[1], found[2]), key=int) if int(found[1]) > 12 else (found[1], found[2])
+    return _day(found[3], int(month), day)
 
 
 def _of_24_hours(found: re.Match[bytes]) -> bytes:
@@ -65,7 +72,7 @@ _RULES = (
         re.compile(rb"(?<!\w)" + _MONTH + rb"\.? {1,2}(\d{1,2}),? (\d{4}),?[T ]" + _CLOCK_FOLLOWS, re.IGNORECASE),
         lambda m: _day(m[3], _month(m[1]), m[2]),
     ),
-    _Rule(_AMERICAN, lambda m: _day(m[3], int(m[1]), m[2])),
+    _Rule(_AMERICAN, _slashed),
     # a colon before milliseconds or microseconds; of two digits they may be frames of a film
     _Rule(re.compile(rb"(?<![\d:])(\d{1,2}:\d\d:\d\d):(\d{6}|\d{3})(?![\d:])"), rb"\1.\2"),
     _Rule(
@@ -74,20 +81,28 @@ _RULES = (
     ),
     _Rule(re.compile(rb"(?<![\d:.])(\d:\d\d:\d\d)(?![\d:])"), rb"0\1"),
     # the exponents of Fortran's double precision; 1D5 may be a number to the base of 16
-    _Rule(re.compile(rb"(?<=\d)(\.\d*)[dD]([+-]\d{2,3})(?![\w.])"), rb"\1E\2"),
+    _Rule(re.compile(rb"(?<=\d)([.,]\d*)[dD]([+-]\d{2,3})(?![\w.])"), rb"\1E\2"),
 )
 _COMMA_TIME = _Rule(re.compile(rb"(?<!\d)(\d{1,2}:\d\d:\d\d),(\d)"), rb"\1.\2")
 
 
 def rules(sample: bytes, delimiter: str) -> Sequence[_Rule]:
-    """The rules that change something in the first rows of a file; the others are not worth their time."""
+    """The rules that change something in the first and last rows of a file; the others are not worth their time.
+
+    A rule that joins cells is none for this file: there date, time and PM stand in columns of their own.
+    """
     every = _RULES if delimiter == "," else (_COMMA_TIME, *_RULES)  # else 12:00:00,5 is a time and a five
     found = []
     for rule in every:
-        if rule.find.search(sample):
+        turned = rule.find.sub(rule.into, sample)
+        if turned != sample and _widths(turned, delimiter) == _widths(sample, delimiter):
             found.append(rule)
-            sample = rule.find.sub(rule.into, sample)
+            sample = turned
     return found
+
+
+def _widths(rows: bytes, delimiter: str) -> list[int]:
+    return [len(split(line, delimiter)) for line in rows.decode("latin-1").split("\n")]
 
 
 def uniform(data: bytes, by: Sequence[_Rule]) -> bytes:

@@ -287,6 +287,10 @@ class _Rows:
         self._delimiter, self._width = layout.delimiter.encode(), len(layout.names) if layout.ragged else 0
         for _ in range(layout.first):
             self._file.readline()  # within what the layout was found in
+        top = self._file.tell()
+        self._file.seek(max(top, end - HEAD))
+        self._foot = self._file.read(HEAD)  # after midnight an hour may have one digit
+        self._file.seek(top)
         self._rules: Sequence[Any] | None = None  # by which dates and exponents are turned, once the first are seen
         self.remarks, self.closed = 0, False
 
@@ -306,7 +310,7 @@ class _Rows:
             data, remarks = _REMARK.subn(b"", data)
             self.remarks += remarks
             if self._rules is None:
-                self._rules = rules(data[:HEAD], self._delimiter.decode())
+                self._rules = rules(data[:HEAD] + b"\n" + self._foot, self._delimiter.decode())
             data = uniform(data, self._rules)
             if self._spaces:
                 data = re.sub(rb"[ \t]+", b" ", _SPACES.sub(b"", data))

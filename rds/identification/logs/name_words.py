@@ -60,7 +60,7 @@ _AT_THE_MOTOR = _words("motor armature output applied control u vm phase motorsp
 # bounds, and lengths and angles that are no position; but what is corrected by them, or comes behind them, is one
 _BOUNDS = _words("limit limits limitation grenze maximum minimum max min")
 _NO_PLACES = _words(
-    "offset compensation correction tolerance thickness diameter backlash electrical commutation phase "
+    "offset compensation correction tolerance thickness diameter backlash electrical elec commutation phase "
     "limit limits limitation max min"
 )
 _BEHIND = _words("after with without corrected compensated nach mit ohne korrigiert kompensiert")

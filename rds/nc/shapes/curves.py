@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from math import asin, ceil, pi, sqrt
 from typing import NamedTuple
 
@@ -112,16 +113,17 @@ class Distinct(NamedTuple):
 def distinct(curves: Iterable[Curve]) -> Distinct:
     """The curves without those that run along the whole of an earlier one of their layer, in whichever direction."""
     found = Distinct([], 0)
-    by_centre: dict[tuple[str, bool, int, float, float], list[Curve]] = {}
+    alike: dict[tuple[object, ...], list[Curve]] = {}  # by layer, centre and size
     for curve in curves:
-        x, y = curve.points.mean(axis=0) / (4.0 * _TWICE)
-        sorts = (curve.layer, curve.closed, len(curve.points))
-        near = {(*sorts, np.floor(x + a), np.floor(y + b)) for a in (-0.3, 0.3) for b in (-0.3, 0.3)}
-        if any(_same(curve, other) for key in near for other in by_centre.get(key, ())):
+        sort = (curve.layer, curve.closed, len(curve.points))
+        # the size, too: of many squares around one centre each would be held against all others
+        place = np.append(curve.points.mean(axis=0), np.ptp(curve.points, axis=0).sum() / 4.0) / (4.0 * _TWICE)
+        near = {(*sort, *np.floor(place + step)) for step in product((-0.3, 0.3), repeat=3)}
+        if any(_same(curve, other) for key in near for other in alike.get(key, ())):
             found = found._replace(twice=found.twice + 1)
             continue
         found.kept.append(curve)
-        by_centre.setdefault((*sorts, np.floor(x), np.floor(y)), []).append(curve)
+        alike.setdefault((*sort, *np.floor(place)), []).append(curve)
     return found
 
 
