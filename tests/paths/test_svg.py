@@ -67,6 +67,12 @@ def test_per_cent_are_of_the_view_box(drawn: Read) -> None:
     assert drawn('<circle cx="50%" cy="50%" r="10%"/>').curves[0].circle == pytest.approx((50, 50, 10))
 
 
+def test_a_background_of_a_page_without_a_size_is_passed_over(drawn: Read) -> None:
+    drawing = drawn('<rect width="100%" height="100%"/><circle cx="20" cy="20" r="10"/>', "")
+    assert len(drawing.curves) == 1
+    assert drawing.notes == ["passed over: 1 × a background as large as the page, of which the file gives no size"]
+
+
 @pytest.mark.parametrize(
     ("radii", "narrow"),
     [

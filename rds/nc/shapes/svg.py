@@ -235,6 +235,9 @@ class _Reader:
         if tag in _SHAPES and self.paint_is_known and all(paint[key] in _UNSEEN for key in PAINT):
             self._pass_over(_BARE)
             return
+        if not any(view) and tag == "rect" and {element.get("width"), element.get("height")} == {"100%"}:
+            self._pass_over("a background as large as the page, of which the file gives no size")
+            return
         for points, closed, circle in self._shape(tag, element, matrix, view):
             curve = circle_curve(*circle, layer) if circle else polyline_curve(_moved(points, matrix), closed, layer)
             if curve is not None:
