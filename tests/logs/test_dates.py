@@ -194,3 +194,23 @@ def test_the_exponents_of_fortran_are_numbers(tmp_path: Path) -> None:
     path.write_text("time [s],voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
     (log,) = read_log(path)
     assert np.allclose(log.time, 1e-3 * np.arange(300)) and np.array_equal(log.position, 1.5 * np.arange(300))
+
+
+@pytest.mark.parametrize(
+    ("before_midnight", "after"),
+    [
+        ("30.11.2024 23:59:{0:06.3f}", "1.12.2024 00:00:{0:06.3f}"),
+        ("11/30/2024 23:59:{0:06.3f}", "12/1/2024 0:00:{0:06.3f}"),
+        ("2024/11/30 23:59:{0:06.3f}", "2024/12/1 0:00:{0:06.3f}"),
+        ("2024-11-30 23:59:{0:06.3f}", "2024-12-1 0:00:{0:06.3f}"),
+        ("23:59:{0:06.3f}", "0:00:{0:06.3f}"),
+    ],
+)
+def test_days_and_hours_without_zeros_may_come_after_midnight(tmp_path: Path, before_midnight: str, after: str) -> None:
+    """The head of the file, which the forms are looked for in, has none of them."""
+    before = [before_midnight.format(k / 100) for k in range(6000)]
+    rows = [f"{at},{k % 7},{k % 11}" for k, at in enumerate(before + [after.format(k / 100) for k in range(3000)])]
+    (tmp_path / "log.csv").write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    assert len("\n".join(rows[:6000])) > 1 << 16
+    (log,) = read_log(tmp_path / "log.csv")
+    assert np.allclose(log.time, np.arange(9000) / 100, atol=1e-9, rtol=0.0)
