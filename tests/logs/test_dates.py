@@ -214,3 +214,10 @@ def test_days_and_hours_without_zeros_may_come_after_midnight(tmp_path: Path, be
     assert len("\n".join(rows[:6000])) > 1 << 16
     (log,) = read_log(tmp_path / "log.csv")
     assert np.allclose(log.time, np.arange(9000) / 100, atol=1e-9, rtol=0.0)
+
+
+def test_a_date_with_the_day_first_is_told_as_it_is_written(tmp_path: Path) -> None:
+    rows = [f"30/11/2024 23:59:{k / 100:06.3f},{k % 7},{k % 11}" for k in range(900)]
+    (tmp_path / "log.csv").write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match=r"holds '30/11/2024 23:59:00\.000' in data row 1; write dates as"):
+        read_log(tmp_path / "log.csv")

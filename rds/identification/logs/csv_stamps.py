@@ -68,7 +68,8 @@ _RULES = (
         re.compile(rb"(?<!\w)" + _MONTH + rb"\.? {1,2}(\d{1,2}),? (\d{4}),?[T ]" + _CLOCK_FOLLOWS, re.IGNORECASE),
         lambda m: _day(m[3], _month(m[1]), m[2]),
     ),
-    _Rule(_AMERICAN, lambda m: _day(m[3], int(m[1]), m[2])),
+    # no month: left as it is, which is refused
+    _Rule(_AMERICAN, lambda m: _day(m[3], int(m[1]), m[2]) if int(m[1]) <= 12 else m[0]),
     # a colon before milliseconds or microseconds; of two digits they may be frames of a film
     _Rule(re.compile(rb"(?<![\d:])(\d{1,2}:\d\d:\d\d):(\d{6}|\d{3})(?![\d:])"), rb"\1.\2"),
     _Rule(
