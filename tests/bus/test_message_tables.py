@@ -144,3 +144,13 @@ def test_options_of_machines_are_refused_for_tables(tmp_path: Path) -> None:
 def test_other_databases_are_converted_by_cantools() -> None:
     with pytest.raises(InputError, match=r"convert it: `cantools convert car\.kcd car\.dbc`, and name car\.dbc"):
         is_message_table(Path("car.kcd"))
+
+
+@pytest.mark.parametrize(("kind", "value"), [("STRING", '"fast"'), ("INT 0 0", "1" + "0" * 400), ("INT 0 0", "-5")])
+def test_a_cycle_time_that_is_none_counts_as_not_given(tmp_path: Path, kind: str, value: str) -> None:
+    text = DBC.replace("INT 0 65535", kind).replace(" 256 10;", f" 256 {value};")
+    if kind == "STRING":
+        text = text.replace('"GenMsgCycleTime" 0;', '"GenMsgCycleTime" "";').replace(" 100;", ' "";')
+    (tmp_path / "car.dbc").write_text(text)
+    found = read_messages(tmp_path / "car.dbc", period=0.01)
+    assert {message.name: message.period for message in found.messages}["Speed"] == 0.01

@@ -295,3 +295,10 @@ def test_the_values_and_names_of_a_compact_array_are_those_of_its_sections(tmp_p
         0x1600: [None, None, None],
     }
     assert [od[0x1016][k].name for k in (1, 2, 3)] == ["Heartbeats", "Heartbeats", "of the third"]
+
+
+@pytest.mark.parametrize("line", ["DataType=$NODEID+0x7", "CompactSubObj=$NODEID", "CompactSubObj=-1"])
+def test_a_type_or_a_count_that_is_no_number_is_passed_over(tmp_path: Path, line: str) -> None:
+    (tmp_path / "drive.eds").write_text(f"{COMPACT}[2000]\nParameterName=odd\nDataType=7\n{line}\n")
+    od = read_eds(tmp_path / "drive.eds", node=5)
+    assert [od[0x1016][k].default for k in sorted(od[0x1016])] == [3, 7, 0x10005, 7]

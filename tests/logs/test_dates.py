@@ -239,3 +239,30 @@ def test_hours_of_one_digit_may_begin_at_midnight(tmp_path: Path) -> None:
     path.write_text("\n".join(["time,u_V,y_mm,word", *rows]) + "\n")
     (log,) = read_log(path)
     assert path.stat().st_size > 2 * HEAD and np.allclose(log.time, 2e-2 * np.arange(4000), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("before_midnight", "after"),
+    [
+        ("30.11.2024 23:59:{0:06.3f}", "1.12.2024 00:00:{0:06.3f}"),
+        ("11/30/2024 23:59:{0:06.3f}", "12/1/2024 0:00:{0:06.3f}"),
+        ("2024/11/30 23:59:{0:06.3f}", "2024/12/1 0:00:{0:06.3f}"),
+        ("2024-11-30 23:59:{0:06.3f}", "2024-12-1 0:00:{0:06.3f}"),
+        ("23:59:{0:06.3f}", "0:00:{0:06.3f}"),
+    ],
+)
+def test_days_and_hours_without_zeros_may_come_after_midnight(tmp_path: Path, before_midnight: str, after: str) -> None:
+    """The head of the file, which the forms are looked for in, has none of them."""
+    before = [before_midnight.format(k / 100) for k in range(6000)]
+    rows = [f"{at},{k % 7},{k % 11}" for k, at in enumerate(before + [after.format(k / 100) for k in range(3000)])]
+    (tmp_path / "log.csv").write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    assert len("\n".join(rows[:6000])) > 1 << 16
+    (log,) = read_log(tmp_path / "log.csv")
+    assert np.allclose(log.time, np.arange(9000) / 100, atol=1e-9, rtol=0.0)
+
+
+def test_what_is_no_date_is_told_as_it_is_written(tmp_path: Path) -> None:
+    rows = [f"31/31/2024 23:59:{k / 100:06.3f},{k % 7},{k % 11}" for k in range(900)]
+    (tmp_path / "log.csv").write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match=r"holds '31/31/2024 23:59:00\.000' in data row 1; write dates as"):
+        read_log(tmp_path / "log.csv")

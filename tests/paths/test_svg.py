@@ -193,7 +193,14 @@ def test_what_a_style_sheet_does_and_is_not_done_is_told(drawn: Read, sheet: str
 
 
 @pytest.mark.parametrize(
-    "inner", ['<circle r="1e300"/>', '<path d="M0 0 A 1e20 1e20 0 0 1 5 5"/>', '<path d="M0 0L1e999 5"/>']
+    "inner",
+    [
+        '<circle r="1e300"/>',
+        '<path d="M0 0 A 1e20 1e20 0 0 1 5 5"/>',
+        '<path d="M0 0 A 99999999999 5 0 0 1 10 10"/>',  # as chords these would be 8 million
+        '<path d="M0 0L1e999 5"/>',
+        '<polyline transform="skewX(1)" points="1e308 1e400 1 2"/>',  # no numbers, once they are moved
+    ],
 )
 def test_numbers_too_large_for_a_drawing_are_refused(tmp_path: Path, inner: str) -> None:
     path = tmp_path / "part.svg"

@@ -212,3 +212,16 @@ def test_what_is_no_model_is_refused() -> None:
 
 def test_a_report_without_sections_is_what_it_was() -> None:
     assert "Validation of" not in report("t", [result_of(square(0.1))])
+
+
+@pytest.mark.parametrize("samples", [0, 1])
+def test_a_run_that_was_killed_at_its_first_sample_keeps_its_result(samples: int) -> None:
+    import rds as package
+
+    experiment = package.Experiment(
+        mode="model-validation", duration=0.01, signal=package.square(amplitude=3.0, frequency=100.0)
+    )
+    whole = result_of(square(0.01))
+    result = Result({name: values[:samples] for name, values in whole.columns.items()}, whole.units, whole.meta)
+    assert validated(experiment.plan(), result) is result and "validation" not in result.meta
+    assert f"no model is validated: result: it has {samples} sample" in result.meta["notes"][-1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -80,7 +81,7 @@ def _of_dbc(path: Path, period: float | None) -> MessageTable:
         if entry.length > _LONGEST and not entry.is_fd:
             transported.append(entry.name)
             continue
-        its_period = entry.cycle_time * 1e-3 if entry.cycle_time else period
+        its_period = _period(entry.cycle_time) or period
         if its_period is None:
             silent.append(entry.name)
             continue
@@ -97,6 +98,15 @@ def _of_dbc(path: Path, period: float | None) -> MessageTable:
             )
         )
     return MessageTable(messages, silent, transported)
+
+
+def _period(cycle_time: Any) -> float | None:
+    """In s, of GenMsgCycleTime in ms; None for 0, and for what is no time, as of an attribute that is a text."""
+    try:
+        found = float(cycle_time or 0) * 1e-3
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return found if isfinite(found) and found > 0.0 else None
 
 
 def _switches_rate(entry: Any, database: Any) -> bool:

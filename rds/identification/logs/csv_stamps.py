@@ -27,6 +27,7 @@ CLOCK = re.compile(r"\d\d:\d\d:\d\d(\.\d{1,9})?")  # a time of day
 class _Rule(NamedTuple):
     find: re.Pattern[bytes]
     into: bytes | Callable[[re.Match[bytes]], bytes]
+    is_short: bool = False  # of days and hours without zeros, which a log may come to after midnight
 
 
 def _day(year: bytes, month: int, day: bytes) -> bytes:
@@ -39,7 +40,7 @@ def _month(name: bytes) -> int:
 
 def _slashed(found: re.Match[bytes]) -> bytes:
     month, day = sorted((found[1], found[2]), key=int) if int(found[1]) > 12 else (found[1], found[2])
-    return _day(found[3], int(month), day)
+    return _day(found[3], int(month), day) if int(month) <= 12 else found[0]  # no date: left as it is, which is refused
 
 
 def _of_24_hours(found: re.Match[bytes]) -> bytes:
@@ -59,10 +60,12 @@ _RULES = (
             rb"(?<![\d/-])(?!\d{4}-\d\d-\d\d[T ])(\d{4})([-/])(\d{1,2})\2(\d{1,2})[T ._]" + _CLOCK_FOLLOWS,
         ),
         lambda m: _day(m[1], int(m[3]), m[4]),
+        is_short=True,
     ),
     _Rule(
         re.compile(rb"(?<![\d.])(\d{1,2})\.(\d{1,2})\.(\d{4}),?[T ]" + _CLOCK_FOLLOWS),
         lambda m: _day(m[3], int(m[2]), m[1]),
+        is_short=True,
     ),
     _Rule(  # MATLAB's 01-Mar-2024, and 1 March 2024
         re.compile(rb"(?<![\w.])(\d{1,2})[- ]" + _MONTH + rb"[- ](\d{4}),?[T ]" + _CLOCK_FOLLOWS, re.IGNORECASE),
@@ -79,23 +82,24 @@ _RULES = (
         re.compile(rb"(?<![\d:])(\d{1,2})(:\d\d(?::\d\d(?:\.\d{1,9})?)?) ?([ap])\.?m\b\.?", re.IGNORECASE),
         _of_24_hours,
     ),
-    _Rule(re.compile(rb"(?<![\d:.])(\d:\d\d:\d\d)(?![\d:])"), rb"0\1"),
+    _Rule(re.compile(rb"(?<![\d:.])(\d:\d\d:\d\d)(?![\d:])"), rb"0\1", is_short=True),
     # the exponents of Fortran's double precision; 1D5 may be a number to the base of 16
     _Rule(re.compile(rb"(?<=\d)([.,]\d*)[dD]([+-]\d{2,3})(?![\w.])"), rb"\1E\2"),
 )
 _COMMA_TIME = _Rule(re.compile(rb"(?<!\d)(\d{1,2}:\d\d:\d\d),(\d)"), rb"\1.\2")
 
 
-def rules(sample: bytes, delimiter: str) -> Sequence[_Rule]:
-    """The rules that change something in the first and last rows of a file; the others are not worth their time.
+def rules(sample: bytes, delimiter: str, short: bool = False) -> Sequence[_Rule]:
+    """The rules that change something in the first rows of a file; the others are not worth their time.
 
     A rule that joins cells is none for this file: there date, time and PM stand in columns of their own.
+    short: those of days and hours without zeros too, as 0:00:00 after a head of 23:59:59.
     """
     every = _RULES if delimiter == "," else (_COMMA_TIME, *_RULES)  # else 12:00:00,5 is a time and a five
     found = []
     for rule in every:
         turned = rule.find.sub(rule.into, sample)
-        if turned != sample and _widths(turned, delimiter) == _widths(sample, delimiter):
+        if _widths(turned, delimiter) == _widths(sample, delimiter) if turned != sample else short and rule.is_short:
             found.append(rule)
             sample = turned
     return found

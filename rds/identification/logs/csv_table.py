@@ -97,13 +97,16 @@ def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Pro
     if cut is not None:
         findings.append(cut)
     names = unique(layout.names, findings)
-    words = set(layout.words)
+    words, short = set(layout.words), False
     while True:  # a column that turns out to hold words is read again as such, once
         try:
-            values, texts, remarks = _read(path, layout, words, end, progress)
+            values, texts, remarks = _read(path, layout, words, end, progress, short)
             break
         except _NotNumber as error:
-            words.add(error.column)
+            if error.column in layout.dates and not short:
+                short = True  # after midnight there may be days and hours without zeros
+            else:
+                words.add(error.column)
     found_late = {row for i, (row, _) in texts.items() if i not in layout.words}
     if not values and len(found_late) == 1:
         cells = ", ".join(repr(texts[i][1]) for i in sorted(texts) if i not in layout.words)
@@ -205,7 +208,7 @@ class _NotNumber(Exception):
 
 
 def _read(
-    path: Path, layout: Layout, words: set[int], end: int, progress: Progress | None
+    path: Path, layout: Layout, words: set[int], end: int, progress: Progress | None, short: bool
 ) -> tuple[dict[int, np.ndarray], dict[int, tuple[int, str]], int]:
     """Numbers by column; of columns of words the first word with its row; how many remarks were passed over."""
     with needed_for("a log in a text file", where=str(path)):
@@ -224,7 +227,7 @@ def _read(
         refused.append(row)  # Arrow passes on no error that is raised here
         return "error"
 
-    stream = _Rows(path, layout, end)
+    stream = _Rows(path, layout, end, short)
     values: dict[int, list[np.ndarray]] = {i: [] for i in range(len(keys)) if i not in words}
     texts: dict[int, tuple[int, str]] = {}
     rows = 0
@@ -280,17 +283,13 @@ def _read(
 class _Rows:
     """The rows of the file as Arrow wants them: no lines above the data, no remarks, one blank where there are many."""
 
-    def __init__(self, path: Path, layout: Layout, end: int):
+    def __init__(self, path: Path, layout: Layout, end: int, short: bool):
         self._file, self._path = open(path, "rb"), path  # noqa: SIM115 (closed by close())
         self.problem: InputError | None = None  # Arrow passes on no error that is raised here
-        self._end, self._spaces = end, layout.delimiter == " "
+        self._end, self._short, self._spaces = end, short, layout.delimiter == " "
         self._delimiter, self._width = layout.delimiter.encode(), len(layout.names) if layout.ragged else 0
         for _ in range(layout.first):
             self._file.readline()  # within what the layout was found in
-        top = self._file.tell()
-        self._file.seek(max(top, end - HEAD))
-        self._foot = self._file.read(HEAD)  # after midnight an hour may have one digit
-        self._file.seek(top)
         self._rules: Sequence[Any] | None = None  # by which dates and exponents are turned, once the first are seen
         self.remarks, self.closed = 0, False
 
@@ -310,7 +309,7 @@ class _Rows:
             data, remarks = _REMARK.subn(b"", data)
             self.remarks += remarks
             if self._rules is None:
-                self._rules = rules(data[:HEAD] + b"\n" + self._foot, self._delimiter.decode())
+                self._rules = rules(data[:HEAD], self._delimiter.decode(), self._short)
             data = uniform(data, self._rules)
             if self._spaces:
                 data = re.sub(rb"[ \t]+", b" ", _SPACES.sub(b"", data))

@@ -22,7 +22,11 @@ def validated(plan: Plan, result: Result) -> Result:
     from rds.identification.validate.validate import validate
 
     found: dict[str, Validation] = {}
-    logs = logs_of_result(result, "this run", "", "")
+    try:
+        logs = logs_of_result(result, "this run", "", "")
+    except InputError as error:  # killed in its first samples: what is said of its ending must be read
+        result.meta["notes"].append(f"no model is validated: {error}")
+        return result
     for axis, log in zip(plan.axes, logs, strict=True):
         try:
             found[axis.axis.name] = validate(_candidate(axis.model, axis.axis.unit), log)

@@ -91,11 +91,13 @@ def polyline_curve(points: Sequence[Sequence[float]] | np.ndarray, closed: bool,
     return Curve(rows, closed and len(rows) > 2, layer)
 
 
-def assembled(curves: Iterable[Curve], name: str, passed_over: dict[str, int]) -> Drawing:
+def assembled(curves: Sequence[Curve], name: str, passed_over: dict[str, int]) -> Drawing:
     """A drawing of these curves: each of a layer once, however often it is drawn, and open ones joined where they meet.
 
     Drawn twice, two sides of a square would be a way there and back, and a closed curve an island in itself.
     """
+    if not all(np.isfinite(curve.points).all() for curve in curves):  # such points have no neighbours to look for
+        raise InputError("holds a number too large for a drawing; correct it, or save it again", name)
     once = distinct(curves)
     whole = distinct(joined(once.kept))
     passed_over = passed_over | {"curves that are drawn already, on the same layer": once.twice + whole.twice}

@@ -9,9 +9,11 @@ from math import acos, ceil, cos, pi, radians, sin, sqrt
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.nc.shapes.curves import steps_of
 
 _TOKEN = re.compile(r"([MmLlHhVvCcSsQqTtAaZz])|([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)|([^\s,])")
 _COUNT = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
+_LARGEST = 1e13  # chord errors that a radius has at most: a float's points are then a hundredth of one off
 
 
 def polylines(d: str, chord_error: float, where: str) -> Iterator[tuple[np.ndarray, bool]]:
@@ -165,7 +167,9 @@ def _arc(
     if not positive and sweep > 0:
         sweep -= 2 * pi
     size = max(rx, ry)
-    n = max(ceil(abs(sweep) / (2 * acos(1 - min(chord_error / size, 1.0)))), 2)
+    if not size < _LARGEST * chord_error:
+        raise InputError(f"an arc of radius {size:g} is too large for its points to be known; correct it")
+    n = steps_of(size, sweep, chord_error)
     middle = complex(cx, cy) * turn + (here + end) / 2
     along = first + sweep * np.arange(1, n) / n
     points = [middle + turn * complex(rx * cos(a), ry * sin(a)) for a in along]

@@ -109,7 +109,7 @@ def _objects(sections: Mapping[str, Mapping[str, str | None]]) -> dict[int, dict
         members: dict[int | None, Section] = {
             key: section for key, section in thing.items() if key is not None and "DataType" in section
         }
-        count = min(int(whole.pop("CompactSubObj", "0")), 254)
+        count = min(max(int(whole.pop("CompactSubObj", "0")), 0), 254)
         if count and "DataType" in whole:
             members = _compact(sections, index, whole, count)
         if members:
@@ -156,11 +156,13 @@ def _section(values: Mapping[str, str | None]) -> Section:
         if key == "DefaultValue":  # a DCF has what the drive was set to besides
             text = _line(values.get("parametervalue")) or text
         kind = int(found.get("DataType", "0"), 0)
-        if key in ("DefaultValue", "LowLimit", "HighLimit") and (kind in _TEXTS or kind in _REALS):
+        is_value = key in ("DefaultValue", "LowLimit", "HighLimit")
+        if is_value and (kind in _TEXTS or kind in _REALS):
             if text:
                 found[key] = text
             continue
-        stripped, is_relative = (_NODE.sub("", text) or "0", True) if _NODE.search(text) else (text, False)
+        is_relative = is_value and _NODE.search(text) is not None  # of a type or a count it would be no number
+        stripped = (_NODE.sub("", text) or "0") if is_relative else text
         if (number := _number(stripped)) is not None:
             found[key] = f"$NODEID+{number}" if is_relative else str(number)
     return found
