@@ -99,7 +99,8 @@ def rules(sample: bytes, delimiter: str, short: bool = False) -> Sequence[_Rule]
     found = []
     for rule in every:
         turned = rule.find.sub(rule.into, sample)
-        if _widths(turned, delimiter) == _widths(sample, delimiter) if turned != sample else short and rule.is_short:
+        is_of_use = turned != sample or (short and rule.is_short)
+        if is_of_use and _widths(turned, delimiter) == _widths(sample, delimiter):
             found.append(rule)
             sample = turned
     return found
