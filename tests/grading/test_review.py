@@ -171,6 +171,8 @@ def test_pages_and_tables_follow_and_name_no_grader(tmp_path: Path) -> None:
     page = (out / "students/ada/feedback.html").read_text()
     assert "30 of 30 points" in page and "Well &lt;b&gt;argued" in page and "secret reason" not in page
     assert "grader-ann" not in page and "Points were set by hand" in page
+    begin = page.index("What to change first")
+    assert page.index("goes by the points as measured", begin) < page.index("</section>", begin)
     assert all(words in (out / "index.html").read_text() for words in ("secret reason", "grader-ann"))
     rows = list(csv.DictReader((out / "grades.csv").open(encoding="utf-8-sig")))
     assert [row["score"] for row in rows] == ["30", "26"]

@@ -82,7 +82,7 @@ def feedback_page(
 
 
 def with_parts(page: str, parts: Mapping[str, str]) -> str:
-    """A page that `feedback_page` made with other parts by name: total, criteria, class."""
+    """A page that `feedback_page` made with other parts by name: total, basis, criteria, class."""
     for name, part in parts.items():
         pattern = re.compile(f"<!--{name}-->.*?<!--/{name}-->", re.DOTALL)
         page = pattern.sub(lambda _, name=name, part=part: _marked(name, part), page, count=1)  # type: ignore[misc]
@@ -120,8 +120,8 @@ def _said_by_graders(grade: Grade) -> str:
     lines = [
         f"{titles.get(each['criterion'], '')}: {each['text']}".removeprefix(": ") for each in review.get("comments", ())
     ]
-    if any(each["kind"] == "points" for each in review.get("entries", ())):
-        lines.append("Points were set by hand. What to change first goes by the points as measured.")
+    if _points_by_hand(grade):
+        lines.append("Points were set by hand.")
     if days := review.get("extension_days"):
         lines.append(f"Your due time was moved by {days:.3g} days.")
     if spent := review.get("late_days_spent"):
@@ -132,11 +132,22 @@ def _said_by_graders(grade: Grade) -> str:
     return f'<div class="said"><strong>From your instructors</strong><ul>{items}</ul></div>'
 
 
+def _points_by_hand(grade: Grade) -> bool:
+    review = grade.details.get("review")
+    return isinstance(review, Mapping) and any(each["kind"] == "points" for each in review.get("entries", ()))
+
+
+def basis_part(grade: Grade) -> str:
+    """At the advice: that it knows nothing of the points that graders set."""
+    said = "This goes by the points as measured, before some were set by hand."
+    return f"<p><em>{said}</em></p>" if _points_by_hand(grade) else ""
+
+
 def _advice(assignment: Assignment, grade: Grade, runs: Sequence[CaseRun]) -> str:
     found = advice(assignment, grade, runs)
     if found is None:
         return ""
-    parts = [f"<h2>What to change first</h2><p>{escape(found.sentence)}</p>"]
+    parts = [f"<h2>What to change first</h2>{_marked('basis', '')}<p>{escape(found.sentence)}</p>"]
     if found.picture is not None:
         caption = escape(one_line(found.caption))
         parts.append(

@@ -19,7 +19,7 @@ from rds.grading.batch.journal import FILE as JOURNAL
 from rds.grading.batch.journal import read_journal
 from rds.grading.batch.similarity_table import found_html
 from rds.grading.feedback.class_files import write_class_files
-from rds.grading.feedback.feedback import class_part, criteria_part, total_part, with_parts
+from rds.grading.feedback.feedback import basis_part, class_part, criteria_part, total_part, with_parts
 from rds.grading.intake.names import safe_id
 
 SIMILARITY = "similarity.json"
@@ -69,6 +69,7 @@ def _pages(finished: Finished, assignment: Assignment) -> Iterator[tuple[Path, b
         page = source.read_text(encoding="utf-8")
         parts = {
             "total": total_part(grade),
+            "basis": basis_part(grade),
             "criteria": criteria_part(assignment, grade),
             "class": class_part(grade, finished.grades),
         }
