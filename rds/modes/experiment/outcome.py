@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-import os
+import io
 import platform
 import sys
 from collections.abc import Mapping
@@ -163,10 +163,15 @@ def _concluded(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
     return said
 
 
+class _Nowhere(io.TextIOBase):
+    def write(self, text: str) -> int:
+        return len(text)
+
+
 def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarray]:
     """Each axis's response in a closed loop of its own: the same plan, simulated, for as long as the run lasted."""
     same = replace(as_recorded(plan, rows).unwatched(), mode=SIMULATION, samples=int(sample[-1]) + 1)
-    with open(os.devnull, "w", encoding="utf-8") as nowhere, _QUIET, redirect_stdout(nowhere):
+    with _QUIET, redirect_stdout(_Nowhere()):
         simulated = run_plan(same, None)  # its prints would pass for the run's own, which are in `target.log`
     of = dict(zip(simulated.columns, simulated.values.T, strict=True))
     return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}
