@@ -130,6 +130,13 @@ def test_what_is_no_eds_is_told(text: str, said: str, tmp_path: Path) -> None:
         read_eds(tmp_path / "nowhere.eds", 5)
 
 
+def test_an_eds_of_millions_of_sub_indices_is_refused(tmp_path: Path) -> None:
+    arrays = (f"[{index:04X}]\nObjectType=0x8\nDataType=0x7\nCompactSubObj=254\n" for index in range(0x2000, 0x2100))
+    (tmp_path / "wide.eds").write_text("[DeviceInfo]\n" + "".join(arrays))
+    with pytest.raises(InputError, match=r"wide\.eds.* more than 50000 sub-indices"):
+        read_eds(tmp_path / "wide.eds", 5)
+
+
 def changed(folder: Path, *changes: tuple[str, str]) -> Path:
     """Our drive's EDS, otherwise."""
     text = files("rds.bus.modules.cia402").joinpath("axis.eds").read_text()

@@ -39,6 +39,13 @@ def test_what_is_electrical_or_a_bound_is_not_the_axis_s(tmp_path: Path, name: s
         read_log(written(tmp_path, f"t_s,u_V,{name}", [T, U, V]))
 
 
+def test_the_angle_of_a_pendulum_is_not_the_position_of_its_cart(tmp_path: Path) -> None:
+    (log,) = read_log(written(tmp_path, "t_s,u_V,position_mm,theta_deg", [T, U, V, V + 900.0]))
+    assert log.units["position"] == "mm" and np.allclose(log.position, V, atol=1e-5)
+    (log,) = read_log(written(tmp_path, "t_s,u_V,theta_deg", [T, U, V]))
+    assert log.units["position"] == "deg"
+
+
 def test_the_speed_of_a_spindle_is_not_that_of_a_linear_axis(tmp_path: Path) -> None:
     (log,) = read_log(written(tmp_path, "t_s,u_V,position_mm,spindle_rpm", [T, U, V, V + 900.0]))
     assert log.units["position"] == "mm" and "velocity" not in log.extra

@@ -294,6 +294,8 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
             return {}, doubt + (f" (no unit: {', '.join(bare[:_TOLD])})" if bare else "")
         if quantity == "position":
             fits = [*fits, *(c for c in measured if c.unit is None and _IN_METRES.fullmatch(c.name.lower()))]
+        if quantity == "position" and len(fits) > 1:  # theta beside a position may be a pendulum's
+            fits = [c for c in fits if "theta" not in words_of(c.name)] or fits
         if len(fits) > 1:
             names = ", ".join(c.name + (f" [{c.unit}]" if c.unit else "") for c in fits)
             are_speeds = all(dimension(c.unit or "") == "angular speed" for c in fits)

@@ -19,6 +19,7 @@ import canopen
 from rds.core.errors import InputError
 
 _LARGEST = 4 << 20  # bytes of an EDS
+_MOST = 50_000  # sub-indices: compact arrays describe 254 of them in a line
 _INDEX = re.compile(r"([0-9a-f]{4})", re.IGNORECASE)
 _SUBINDEX = re.compile(r"([0-9a-f]{4})sub([0-9a-f]{1,2})", re.IGNORECASE)
 _NODE = re.compile(r"\s*\+?\s*\$nodeid\s*\+?\s*", re.IGNORECASE)
@@ -60,7 +61,7 @@ def read_eds(path: str | Path, node: int) -> canopen.ObjectDictionary:
     sections = {name.strip().lower(): dict(parser[name]) for name in parser.sections()}
     if "deviceinfo" not in sections:
         raise InputError("not a readable EDS: it has no section [DeviceInfo]", str(path))
-    text = io.StringIO("\n".join(_rewritten(sections)))
+    text = io.StringIO("\n".join(_rewritten(sections, str(path))))
     text.name = "rewritten.eds"  # by whose ending the library knows the format
     try:
         return canopen.import_od(text, node)
@@ -77,7 +78,7 @@ def _text(data: bytes) -> str:
     return text[max(text.find("["), 0) :].replace("\0", "")
 
 
-def _rewritten(sections: Mapping[str, Mapping[str, str | None]]) -> Iterator[str]:
+def _rewritten(sections: Mapping[str, Mapping[str, str | None]], where: str) -> Iterator[str]:
     device = sections["deviceinfo"]
     yield "[DeviceInfo]"
     for key in _DEVICE_NUMBERS:
@@ -89,14 +90,15 @@ def _rewritten(sections: Mapping[str, Mapping[str, str | None]]) -> Iterator[str
     used = sections.get("dummyusage", {})
     for number in range(1, 8):
         yield f"Dummy{number:04d}={1 if _number(used.get(f'dummy{number:04d}')) else 0}"
-    for index, thing in sorted(_objects(sections).items()):
+    for index, thing in sorted(_objects(sections, where).items()):
         for subindex, section in sorted(thing.items(), key=lambda item: -1 if item[0] is None else item[0]):
             yield f"[{index:04X}]" if subindex is None else f"[{index:04X}sub{subindex:X}]"
             yield from (f"{key}={value}" for key, value in section.items())
 
 
-def _objects(sections: Mapping[str, Mapping[str, str | None]]) -> dict[int, dict[int | None, Section]]:
+def _objects(sections: Mapping[str, Mapping[str, str | None]], where: str) -> dict[int, dict[int | None, Section]]:
     """By index, the section of the object (None) and those of its sub-indices."""
+    described = 0
     found: dict[int, dict[int | None, Section]] = {}
     for name, values in sections.items():
         if match := _INDEX.fullmatch(name):
@@ -112,6 +114,9 @@ def _objects(sections: Mapping[str, Mapping[str, str | None]]) -> dict[int, dict
         count = min(max(int(whole.pop("CompactSubObj", "0")), 0), 254)
         if count and "DataType" in whole:
             members = _compact(sections, index, whole, count)
+        described += len(members)
+        if described > _MOST:
+            raise InputError(f"it describes more than {_MOST} sub-indices, and no drive has so many", where)
         if members:
             kind = whole.get("ObjectType")
             head = {"ParameterName": whole["ParameterName"], "ObjectType": kind if kind == _ARRAY else _RECORD}
