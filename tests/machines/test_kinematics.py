@@ -12,6 +12,7 @@ from machines.machine_text import link, machine
 
 from rds.core.errors import InputError
 from rds.machines import Machine, load_machine, machine_names
+from rds.machines.configuration import verdict
 from rds.machines.kinematics import identity_of
 from rds.machines.kinematics.kinematics import pose
 
@@ -170,6 +171,22 @@ def test_a_singular_pose_keeps_the_joint_that_may_stand_anywhere() -> None:
     drill = MACHINES["mrmt-oacs"].kinematics
     q = np.array([-83.5, 10.0, 77.0])
     np.testing.assert_allclose(drill.inverse(drill.forward(q), near=q), q, atol=1e-9)
+
+
+def test_a_free_joint_turns_where_a_slide_would_pass_its_end(tmp_path: Path) -> None:
+    """X 140 and Y 140 with the table at 45° is Y 198 with the table at 0°, and Y ends at 150."""
+    kinematics = MACHINES["xyzac"].kinematics
+    wanted = kinematics.forward({"X": 140.0, "Y": 140.0, "C": 45.0})
+    found = kinematics.inverse(wanted)
+    assert (np.abs(found[:2]) <= 150.0).all()
+    np.testing.assert_allclose(kinematics.forward(found)[:3, 2:], wanted[:3, 2:], atol=1e-6)
+    too_far = kinematics.forward({"Y": 215.0})  # beyond the corner, 150 √2
+    assert np.isnan(kinematics.inverse(too_far)).all()
+
+    links = link(name="X", axis="X", joint="X") + link(name="Y", axis="Y", joint="Y")
+    links += link(name="Z", axis="Z", joint="Z") + link(name="table", parent="bed", axis="C", joint="ZA")
+    mill = machine(tmp_path, "XYZC", links + '[tool]\nlink = "Z"\n[work]\nlink = "table"\n')
+    assert verdict(mill).ok, verdict(mill)
 
 
 def test_whole_turns_are_added_so_that_the_joint_stays_near() -> None:

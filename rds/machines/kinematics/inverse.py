@@ -20,6 +20,7 @@ _OVER = 1e-9  # of a limit, for rounding: mm, degrees
 _BLOCK = 4096  # poses at a time: what stays in the processor's cache
 _STARTS, _ROUNDS = 64, 3
 _STEPS = 60
+_SINGULAR = 1e-6  # of the largest singular value, and of a motion that leaves the tool where it is
 _DAMPING = 1e-2  # at first, of the square of a joint's lever
 
 
@@ -56,18 +57,43 @@ def _closed(
         second = (tries[1][0] < tries[0][0]).astype(int)
         order = [second, 1 - second]
     left = np.arange(len(near))
+    outside: dict[int, np.ndarray] = {}
     for choice in order:
         angles = tries[0][1] if len(tries) == 1 else np.where(choice[:, None] == 0, tries[0][1], tries[1][1])
         values = near[left].copy()
         values[:, turning] = angles[left]
         values[:, structure.linear] = 0.0
-        good = shifts_for(kinematics, structure, values, poses[left])
-        good &= _within(values, bounds, structure)
+        met = shifts_for(kinematics, structure, values, poses[left])
+        good = met & _within(values, bounds, structure)
         made[left[good]] = values[good]
+        outside = dict(zip(left[met & ~good], values[met & ~good], strict=True)) | outside  # the nearer stays
         left = left[~good]
         if not len(left):
             break
+    _turn_free_joints(kinematics, structure, poses, made, outside, bounds)
     return made
+
+
+def _turn_free_joints(
+    kinematics: Kinematics,
+    structure: Structure,
+    poses: np.ndarray,
+    made: np.ndarray,
+    outside: dict[int, np.ndarray],
+    bounds: np.ndarray,
+) -> None:
+    """Solve the rows that meet their pose `outside` the bounds alone, where a free joint brings the linear ones back.
+
+    Below an upright tool a rotary table may stand anywhere; where `near` has it, a slide may be beyond its end.
+    """
+    rows = [row for row in outside if np.isnan(made[row]).any()]
+    if not rows or not structure.linear:
+        return
+    slope = _missed(kinematics, poses[rows[0]], np.array([outside[row] for row in rows]))[1]
+    still = np.eye(len(bounds)) - np.linalg.pinv(slope, rcond=_SINGULAR) @ slope  # what leaves the tool where it is
+    for row, moves in zip(rows, np.abs(still[:, list(structure.linear)]).max(axis=(1, 2)) > _SINGULAR, strict=True):
+        if moves:
+            made[row] = _one(kinematics, poses[row], outside[row], bounds)
 
 
 def _turned_near(angles: np.ndarray, near: np.ndarray, bounds: np.ndarray) -> np.ndarray:
