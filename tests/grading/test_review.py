@@ -231,6 +231,9 @@ def test_the_best_attempt_counts_with_what_was_said_of_it(tmp_path: Path) -> Non
     page = (tmp_path / "best/students/ada/feedback.html").read_text()
     assert "30 of 30 points" in page and "good" in page
     assert "2: 30 (counts)" in finished.grades[0].notes[-1]
+    say(tmp_path / "best", [Entry(Kind.COMMENT, "bob", "ada", comment="well done")])
+    page = (tmp_path / "best/students/ada/feedback.html").read_text()
+    assert "well done" in page and "Points were set by hand." in page
 
 
 def test_late_days_are_never_given_back_by_the_best_of_attempts(tmp_path: Path) -> None:

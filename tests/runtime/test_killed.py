@@ -497,6 +497,20 @@ def test_what_a_controller_prints_is_kept_apart(
     assert (alone / "run" / "target.log").read_text().count("hello") == 5
 
 
+def test_what_a_law_writes_as_bytes_stops_no_simulation_beside_a_run(
+    experiment: Maker, alone: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def write() -> None:
+        sys.stdout.buffer.write(b"hello\n")
+        sys.stdout.flush()
+
+    talking = experiment(every(100, write), duration=0.5, compiled=True)
+    result = unless_lost(lambda: talking.run("implementation", out=alone / "run"))
+    assert capfd.readouterr().out == "" and "X_simulated" in result.columns
+    told = [note for note in result.meta["notes"] if note.startswith(("not compiled", "what your code printed"))]
+    assert len(told) == 2  # what is said of the compiler takes nothing else away
+
+
 def test_too_many_late_samples_in_a_row_end_the_run(experiment: Maker) -> None:
     def slow() -> None:
         time.sleep(0.002)

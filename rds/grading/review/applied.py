@@ -54,7 +54,7 @@ def reviewed(grade: Grade, late: LateRules, member: Member | None, entries: Sequ
         "extension_days": extension + float(earlier.get("extension_days", 0.0)),
         "late_days_spent": spent,
         "by": sorted({each.by for each in entries}),
-        "entries": [asdict(each) for each in entries],
+        "entries": [*earlier.get("entries", ()), *(asdict(each) for each in entries)],
     }
     made = replace(
         grade,

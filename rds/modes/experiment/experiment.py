@@ -315,7 +315,7 @@ class Experiment:
             elif (compiled := run_compiled(plan)) is not None:
                 return compiled
         rows = run_plan(plan, folder, progress, live)
-        return replace(rows, notes=(note,)) if note else rows
+        return replace(rows, notes=(note, *rows.notes)) if note else rows
 
 
 def on_machine(table: Mapping[str, Any], machine: Machine, channel: str | None) -> dict[str, Any]:

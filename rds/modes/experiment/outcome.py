@@ -163,15 +163,19 @@ def _concluded(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
     return said
 
 
-class _Nowhere(io.TextIOBase):
-    def write(self, text: str) -> int:
-        return len(text)
+class _Nowhere(io.RawIOBase):
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: Any) -> int:
+        return len(data)
 
 
 def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarray]:
     """Each axis's response in a closed loop of its own: the same plan, simulated, for as long as the run lasted."""
     same = replace(as_recorded(plan, rows).unwatched(), mode=SIMULATION, samples=int(sample[-1]) + 1)
-    with _QUIET, redirect_stdout(_Nowhere()):
+    nowhere = io.TextIOWrapper(io.BufferedWriter(_Nowhere()), "utf-8", "replace")  # laws may write to its buffer, too
+    with _QUIET, redirect_stdout(nowhere):
         simulated = run_plan(same, None)  # its prints would pass for the run's own, which are in `target.log`
     of = dict(zip(simulated.columns, simulated.values.T, strict=True))
     return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}
