@@ -217,7 +217,7 @@ def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) ->
     scores = {score.name: score for score in grade.criteria} if is_graded else {}
     cells = [
         _points(grade.score) if is_graded else "–",
-        told_days(grade.late_days, ".2g") if grade.late_days else "",
+        told_days(grade.late_days) if grade.late_days else "",
     ]
     numbers = "".join(f'<td class="number">{each}</td>' for each in cells)
     numbers += "".join(_cell(scores.get(name)) for name in criteria)

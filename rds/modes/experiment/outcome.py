@@ -148,7 +148,7 @@ def _at_the_limit(plan: Plan, columns: dict[str, np.ndarray]) -> list[str]:
 
 
 def _drives_away(voltage: np.ndarray, error: np.ndarray) -> bool:
-    """Whether nearly all samples have a voltage against the error, which grows: gains have no part in that."""
+    """Whether nearly all samples have a voltage against the error, and the error is large to the end: a wrong sign."""
     return bool(np.mean(voltage * error < 0.0) > _NEARLY_ALL and abs(error[-1]) > 0.5 * np.abs(error).max())
 
 
