@@ -11,7 +11,7 @@ from rds.grading.assignment.assignment import read_assignment
 from rds.grading.assignment.trusted import TrustedFiles
 from rds.grading.batch.grade_one import OpenSubmission
 from rds.grading.criteria.applied_force import force, free_stretch
-from rds.grading.criteria.law_fit import LawFit, _bounded, departure, law_fits
+from rds.grading.criteria.law_fit import law_fits
 from rds.grading.criteria.linear import LinearLoop, NoLoop, linear_loop
 from rds.models import library_model
 from tests.grading.made import HEAD, assignment_in
@@ -377,43 +377,6 @@ def test_a_law_is_found_exactly_with_its_memory_also_in_a_part() -> None:
     for part in (slice(None), slice(200, 300)):
         *_, fit = law_fits(lfilter(b, a, position), position, part)
         assert fit.is_exact and fit.a == pytest.approx(a, abs=1e-6) and fit.b == pytest.approx(b, abs=1e-6)
-
-
-def test_orders_grow_until_a_law_is_exact_or_none_departs_less() -> None:
-    from scipy.signal import lfilter
-
-    rng = np.random.default_rng(1)
-    position = lfilter([0.01], [1.0, -0.9], rng.standard_normal(400))
-    voltage = lfilter([-5.0, 4.0, 0.5], [1.0, -1.2, 0.3], position)
-
-    def orders(voltage: np.ndarray, part: slice = slice(None), exactly: bool = False) -> list[int]:
-        return [len(fit.a) - 1 for fit in law_fits(voltage, position[: len(voltage)], part, exactly)]
-
-    assert orders(voltage) == orders(voltage, slice(100, 140)) == orders(voltage, exactly=True) == [0, 1, 2]
-    assert orders(voltage[:11]) == [0] and orders(voltage[:12]) == [0, 1]  # four samples for each unknown
-    assert orders(voltage, slice(389, None)) == [0] and orders(voltage, slice(388, None)) == [0, 1]
-    assert orders(0.0 * voltage) == orders(np.nan * voltage) == []
-    noise = rng.standard_normal(400)
-    assert orders(noise) == [0, 1, 2] and orders(noise, exactly=True) == [0, 1, 2, 3, 4]
-    assert orders(np.round(voltage, 2)) == [0, 1, 2, 3, 4]
-
-
-def test_a_law_departs_as_in_the_worst_of_its_parts() -> None:
-    fit, position = LawFit(np.array([1.0, -0.5]), np.array([-4.0, 0.0]), 0.1), np.ones(400)
-    own = -8.0 * (1.0 - 0.5 ** np.arange(1.0, 401.0))
-    doubled = own * np.where(np.arange(400) < 200, 1.0, 2.0)
-    found = [departure(fit, each, position, slice(None), 2) for each in (own, doubled, own / 2.0, np.inf * own)]
-    assert found == pytest.approx([0.0, 0.5, 0.5, 1.0], abs=1e-12)
-    assert departure(fit, doubled, position, slice(0, 200), 2) < 1e-12
-    assert departure(fit, doubled, position, slice(None), 1) == 0.1
-    assert departure(fit, 0.0 * own, 0.0 * position, slice(None), 2) == 0.0
-
-
-def test_poles_that_grow_are_moved_into_the_unit_circle() -> None:
-    poles = sorted(np.abs(np.roots(_bounded(np.poly([-2.0, 0.5, 1.0, 1.2 + 0.9j, 1.2 - 0.9j])))))
-    assert poles == pytest.approx([0.5, 0.98, 0.98, 0.98, 1.0])
-    kept = np.poly([1.0, 0.5])
-    assert _bounded(kept) is kept
 
 
 def test_the_least_stable_of_several_laws_counts() -> None:

@@ -125,9 +125,12 @@ def test_extensions_and_late_days_move_what_is_lost(extension: float, left: int 
     assert found.score == pytest.approx(26.0 * (1.0 - 0.1 * lost))
     excused = reviewed(late, LATE, member, [Entry(Kind.EXCUSE, "ann", "ada")])
     assert of_review(excused)["late_days_spent"] == 0
+    for comment, reason in (("ill", "ill"), ("", "excused by a grader")):
+        found = reviewed(grade(), LATE, None, [Entry(Kind.EXCUSE, "ann", "ada", comment=comment)])
+        assert (found.status, found.reason, found.score) == (Status.EXCUSED, reason, 0.0)
 
 
-def test_a_grader_extends_as_the_class_list_does_and_both_add_up() -> None:
+def test_a_grader_extends_as_the_class_list_does_and_late_days_stay() -> None:
     late = replace(grade(), late_days=2.5, score=23.4, details={"late_share": 0.1})
     extend = Entry(Kind.EXTEND, "ann", "ada", value=1.0)
     found = reviewed(late, LATE, None, [extend, points(6.0)])  # points are no days
@@ -136,10 +139,7 @@ def test_a_grader_extends_as_the_class_list_does_and_both_add_up() -> None:
     assert (found.late_days, of_review(found)["extension_days"]) == (0.5, 2.0)
     again = reviewed(reviewed(late, LATE, None, [extend]), LATE, None, [extend])  # of the best of attempts
     assert (again.late_days, of_review(again)["extension_days"]) == (0.5, 2.0)
-
-
-def test_late_days_of_an_attempt_stay_where_it_is_reviewed_as_the_best() -> None:
-    late = replace(grade(), late_days=2.5, score=23.4, details={"late_share": 0.1})
+    # late days of an attempt stay where it is reviewed as the best
     first = reviewed(late, LATE, Member("ada", late_days=1), [])
     found = reviewed(first, LATE, None, [points(10.0)])
     assert (found.score, of_review(found)["late_days_spent"]) == (24.0, 1)
@@ -158,12 +158,6 @@ def test_a_grade_that_nobody_said_anything_of_is_left_alone() -> None:
     assert not is_changed(reviewed(late, none, Member("ada", late_days=1), []))
     assert is_changed(reviewed(late, none, Member("ada", extension_days=0.5), []))
     assert is_changed(reviewed(late, LATE, None, [])) and is_changed(reviewed(late, none, None, [points(6.0)]))
-
-
-def test_what_a_grader_says_of_an_excuse_is_its_reason() -> None:
-    for comment, reason in (("ill", "ill"), ("", "excused by a grader")):
-        found = reviewed(grade(), LATE, None, [Entry(Kind.EXCUSE, "ann", "ada", comment=comment)])
-        assert (found.status, found.reason, found.score) == (Status.EXCUSED, reason, 0.0)
 
 
 def test_points_behind_gates_change_only_by_the_gates() -> None:

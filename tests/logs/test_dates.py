@@ -11,7 +11,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.identification.logs.csv_layout import HEAD
-from rds.identification.logs.csv_stamps import uniform_cell
+from rds.identification.logs.csv_stamps import is_stamp, uniform_cell
 from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis, headed
 
@@ -292,3 +292,15 @@ def test_what_is_no_date_is_told_as_it_is_written(tmp_path: Path) -> None:
 )
 def test_each_form_means_one_thing(cell: str, same: str) -> None:
     assert uniform_cell(cell) == same
+
+
+def test_a_stamp_has_a_time_of_day() -> None:
+    yes = (
+        "12:00:00",
+        "1:02:03 PM",
+        "12:00:00,5",
+        "2024-03-01 12:00",
+        "1.3.2024 1:02:03",
+        "2024-03-01T12:00:00.5+01:00",
+    )
+    assert all(map(is_stamp, yes)) and not any(map(is_stamp, ("12:00", "2024-03-01", "1.5", "a:b", "12:00:00 V")))
