@@ -133,6 +133,11 @@ def test_what_the_structure_lacks_is_told_from_three_times_the_noise_on(plain: A
     assert left(1.0 / 3.0) is None and left(0.33) == "against"  # the free run leaves 1 mm
     assert left(0.33, 0.99) is None and left(0.33, 1.0) == "against" and left(0.0, 1.0) is None
 
+    held = replace(plain.log, closed_loop=True)  # by the farthest prediction, of which noise alone makes √2
+    for rmse, told in ((2.99 * 2**0.5, None), (3.01 * 2**0.5, "against")):
+        ahead = {1: Errors(0.0, 99.0, 99.0, "mm"), 100: Errors(0.0, rmse, rmse, "mm")}
+        assert side(plain, "structure-held", log=held, noise=1.0, ahead=ahead, naive=ahead) == told
+
 
 def test_errors_grow_by_twice_of_what_they_were_on_the_fit_s_data(plain: Assessment) -> None:
     def grown(rmse: float, own: float, fitted: float | None = 10.0, seen: float = 0.05, **more: object) -> str:
