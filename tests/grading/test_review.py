@@ -20,7 +20,7 @@ from rds.grading.exports.export import export
 from rds.grading.exports.exported import ExportOptions
 from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Band, CriterionScore, Grade, Status
-from rds.grading.review.applied import of_review, reviewed
+from rds.grading.review.applied import is_changed, of_review, reviewed
 from rds.grading.review.best import best
 from rds.grading.review.class_grades import class_grades
 from rds.grading.review.entries import FILE, Entry, Kind, Review, add, read_review
@@ -125,6 +125,57 @@ def test_extensions_and_late_days_move_what_is_lost(extension: float, left: int 
     assert found.score == pytest.approx(26.0 * (1.0 - 0.1 * lost))
     excused = reviewed(late, LATE, member, [Entry(Kind.EXCUSE, "ann", "ada")])
     assert of_review(excused)["late_days_spent"] == 0
+    for comment, reason in (("ill", "ill"), ("", "excused by a grader")):
+        found = reviewed(grade(), LATE, None, [Entry(Kind.EXCUSE, "ann", "ada", comment=comment)])
+        assert (found.status, found.reason, found.score) == (Status.EXCUSED, reason, 0.0)
+
+
+def test_a_grader_extends_as_the_class_list_does_and_late_days_stay() -> None:
+    late = replace(grade(), late_days=2.5, score=23.4, details={"late_share": 0.1})
+    extend = Entry(Kind.EXTEND, "ann", "ada", value=1.0)
+    found = reviewed(late, LATE, None, [extend, points(6.0)])  # points are no days
+    assert (found.late_days, found.score, of_review(found)["late_days_spent"]) == (1.5, 26.0, 2)
+    found = reviewed(late, LATE, Member("ada", extension_days=1.0), [extend])
+    assert (found.late_days, of_review(found)["extension_days"]) == (0.5, 2.0)
+    again = reviewed(reviewed(late, LATE, None, [extend]), LATE, None, [extend])  # of the best of attempts
+    assert (again.late_days, of_review(again)["extension_days"]) == (0.5, 2.0)
+    # late days of an attempt stay where it is reviewed as the best
+    first = reviewed(late, LATE, Member("ada", late_days=1), [])
+    found = reviewed(first, LATE, None, [points(10.0)])
+    assert (found.score, of_review(found)["late_days_spent"]) == (24.0, 1)
+    assert of_review(reviewed(first, LATE, Member("ada", late_days=0), []))["late_days_spent"] == 0
+    assert of_review(reviewed(first, LATE, None, [Entry(Kind.EXTEND, "ann", "ada", value=2.0)]))["late_days_spent"] == 1
+
+
+def test_a_grade_that_nobody_said_anything_of_is_left_alone() -> None:
+    none = LateRules(percent_per_day=10.0)
+    late = replace(grade(), late_days=1.0)
+    assert reviewed(late, none, Member("ada"), []) is late and not is_changed(late)
+    error = grade("ada", Status.GRADER_ERROR)
+    assert reviewed(error, none, None, [points(9.0)]) is error
+    for member in (Member("ada", extension_days=0.5), Member("ada", late_days=1)):
+        assert of_review(reviewed(late, none, member, []))
+    assert not is_changed(reviewed(late, none, Member("ada", late_days=1), []))
+    assert is_changed(reviewed(late, none, Member("ada", extension_days=0.5), []))
+    assert is_changed(reviewed(late, LATE, None, [])) and is_changed(reviewed(late, none, None, [points(6.0)]))
+
+
+def test_points_behind_gates_change_only_by_the_gates() -> None:
+    def after(*scores: CriterionScore, by_hand: float = 10.0) -> CriterionScore:
+        given = [points(by_hand, criterion=each.name) for each in scores[:-1]]
+        return reviewed(grade("ada", Status.OK, *scores), LATE, None, given).criteria[-1]
+
+    shut = score(points=0.0)
+    waits = behind("effort", 0.0, band=Band.REVIEW)
+    assert after(shut, waits) == waits
+    nothing = replace(behind("effort", 0.0), ungated=0.0)
+    assert after(shut, nothing).sentence == nothing.sentence
+    assert after(shut, replace(behind("effort", 0.0), max_score=0.0)).score == 0.0
+    assert after(score(points=0.0, most=0.0), behind("effort", 0.0), by_hand=0.0).score == 0.0
+    odd = replace(behind("effort", 0.0, visible=False), ungated=7.77)
+    assert after(shut, odd).score == 7.77  # an open gate rounds nothing
+    two = replace(behind("effort", 0.0), gates={"rms": 0.0, "speed": 0.0})
+    assert "Error rms and Error speed were set by hand: 8 of 10" in after(shut, score("speed", 0.0), two).sentence
 
 
 def test_an_excused_student_has_no_score_and_is_in_no_gradebook(tmp_path: Path) -> None:

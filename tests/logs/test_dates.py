@@ -11,6 +11,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.identification.logs.csv_layout import HEAD
+from rds.identification.logs.csv_stamps import is_stamp, uniform_cell
 from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis, headed
 
@@ -266,3 +267,40 @@ def test_what_is_no_date_is_told_as_it_is_written(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("time,voltage [V],position [mm]\n" + "\n".join(rows) + "\n")
     with pytest.raises(InputError, match=r"holds '31/31/2024 23:59:00\.000' in data row 1; write dates as"):
         read_log(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("cell", "same"),
+    [
+        ("12:00:00 AM", "00:00:00"),
+        ("12:30:00 pm", "12:30:00"),
+        ("1:05:09.5 p.m.", "13:05:09.5"),
+        ("0:05:09 PM", "00:05:09 PM"),  # no hour of half a day
+        ("12/13/2024 01:02:03", "2024-12-13 01:02:03"),
+        ("13/12/2024 01:02:03", "2024-12-13 01:02:03"),
+        ("12/12/2024 01:02:03", "2024-12-12 01:02:03"),
+        ("13/13/2024 01:02:03", "13/13/2024 01:02:03"),
+        ("31 Dec 2024 1:02:03", "2024-12-31 01:02:03"),
+        ("1-jan-2024 1:02:03", "2024-01-01 01:02:03"),
+        ("Sept. 9, 2024, 01:02:03", "2024-09-09 01:02:03"),
+        ("2024-03-01_01:02:03", "2024-03-01 01:02:03"),
+        ("1:02:03:004", "01:02:03.004"),
+        ("12:00:00:12", "12:00:00:12"),
+        ("1,5d-003", "1,5E-003"),
+        ("1D5", "1D5"),
+    ],
+)
+def test_each_form_means_one_thing(cell: str, same: str) -> None:
+    assert uniform_cell(cell) == same
+
+
+def test_a_stamp_has_a_time_of_day() -> None:
+    yes = (
+        "12:00:00",
+        "1:02:03 PM",
+        "12:00:00,5",
+        "2024-03-01 12:00",
+        "1.3.2024 1:02:03",
+        "2024-03-01T12:00:00.5+01:00",
+    )
+    assert all(map(is_stamp, yes)) and not any(map(is_stamp, ("12:00", "2024-03-01", "1.5", "a:b", "12:00:00 V")))

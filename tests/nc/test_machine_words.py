@@ -80,7 +80,9 @@ def test_an_output_without_a_name_is_refused_by_line(tmp_path: Path) -> None:
     part = program(tmp_path, "G21 G90 F300\nG1 X1\nM64 P3\nM2\n")
     result, _ = check_program(part, load_machine("mini-cnc"), Setup())
     assert [fault.line for fault in result.faults] == [3]
-    assert "names no digital output 3" in str(result.faults[0])
+    assert "names no digital output 3 (it has none)" in str(result.faults[0])
+    (fault,) = check_program(program(tmp_path, "M68 E0 Q1\nM2\n"), load_machine("mini-cnc"), Setup())[0].faults
+    assert "names no analog output 0 (it has none)" in str(fault)
 
 
 def test_a_feed_above_an_axis_is_limited_with_a_note_where_the_machine_says_so(tmp_path: Path) -> None:
@@ -95,6 +97,10 @@ def test_a_feed_above_an_axis_is_limited_with_a_note_where_the_machine_says_so(t
     assert limits is not None
     speed = abs(prepare(part, machine).program.velocity[:, 0]).max()
     assert speed == pytest.approx(limits.velocity, rel=0.002)
+    (tools := tmp_path / "tools.tbl").write_text("T1 P1 Z10 ;max F400\n")  # what a tool bears is no speed of an axis
+    part = program(tmp_path, "G21 G90 F401\nT1 M6\nG1 X1\nM2\n")
+    (fault,) = check_program(part, machine, Setup(tools=tools))[0].faults
+    assert "401 mm/min is more than the tool table allows tool 1 (400); lower it" in str(fault)
 
 
 @pytest.mark.parametrize(

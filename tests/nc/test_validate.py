@@ -20,7 +20,7 @@ from rds.nc.fault_columns import find_word
 from rds.nc.run.report import _program_lines
 from rds.nc.setup import Setup
 from rds.nc.trace import MOST_POINTS, Trace, sample
-from rds.nc.validate import MOST_FAULTS, tool_limits
+from rds.nc.validate import MOST_FAULTS, MOST_WARNINGS, tool_limits
 from rds.nc.validation import Validation, plain
 
 TOOLS = "T1 P1 Z10 D3 ;end mill, max S8000 F400\nT2 P2 D6 ;face mill\n"
@@ -188,6 +188,38 @@ def test_a_loop_tells_each_line_once_and_the_worst_of_it(tmp_path: Path) -> None
     found = check(tmp_path, "#1 = 70\nO1 WHILE [#1 LT 79]\nG0 X#1\nG0 X0\n#1 = [#1 + 1]\nO1 ENDWHILE\nM2\n")
     assert [(fault.line, fault.word) for fault in found.faults] == [(3, "X#1")]
     assert "X would reach 78 mm" in str(found)
+    found = check(tmp_path, "#1 = 78\nO1 WHILE [#1 GT 69]\nG0 X#1\nG0 X0\n#1 = [#1 - 1]\nO1 ENDWHILE\nM2\n")
+    assert [fault.reason.partition(";")[0] for fault in found.faults] == [
+        "X would reach 78 mm (machine coordinates), 3 mm beyond its travel of -75 to 75"
+    ]
+
+
+@pytest.mark.parametrize(("centre", "reached"), [("3", "83 mm"), ("-3", "-83 mm")])
+def test_an_arc_beyond_both_ends_is_told_where_it_is_farther_out(tmp_path: Path, centre: str, reached: str) -> None:
+    found = check(tmp_path, f"#1=[80 * SIN[60]]\nG0 X[{centre} + 40] Y#1\nF60 G3 X[{centre} + 40] I-40 J[-#1]\nM2\n")
+    assert any(f"on this arc X would reach {reached}" in fault.reason for fault in found.faults)
+
+
+@pytest.mark.parametrize(("axis", "number"), [("B", 90), ("C", 300)])
+def test_each_rotary_axis_has_its_limit(tmp_path: Path, axis: str, number: int) -> None:
+    (alone,) = check(tmp_path, f"G1 {axis}1 F2401\nM2\n", "xyzbc").faults
+    assert f"2401 degrees/min is more than {axis}, the slowest rotary axis that moves" in alone.reason
+    (beside,) = check(tmp_path, f"F60\nG1 X1 {axis}{number}\nM2\n", "xyzbc").faults
+    assert f"{axis} would turn at {60 * number} degrees/min to keep up, and can do 2400" in beside.reason
+    assert check(tmp_path, f"F60\nG1 X1 {axis}40\nM2\n", "xyzbc").ok  # just so
+
+
+def test_the_bounds_themselves_are_allowed(tmp_path: Path) -> None:
+    text = "T1 M6\nG4 P3600\nS8000 M3\nF400 G1 X1\nT2 M6\nM3 S10000\nM4\nF660 G1 Z1\nF780 X75\nX-75\nM3 S0\nT0 M6\nM2\n"
+    found = check(tmp_path, text)
+    assert found.ok and (found.tools, found.spindle) == ((1, 2), 10000.0)
+    assert [(told.line, told.word) for told in found.warnings] == [(2, "P3600"), (11, "M3")]
+    assert not check(tmp_path, "G4 P60\nM2\n").warnings
+    (fault,) = check(tmp_path, "G4 P3601\nM2\n").faults
+    assert fault.word == "P3601" and "longer than 3600" in fault.reason
+    assert len(check(tmp_path, "G4 P61\n" * (MOST_WARNINGS + 1) + "M2\n").warnings) == MOST_WARNINGS
+    (fault,) = check(tmp_path, "S100 M3\nM2\n", "xyzbc").faults
+    assert "xyzbc has no spindle to turn" in fault.reason
 
 
 def test_faults_without_end_are_counted(tmp_path: Path) -> None:

@@ -43,7 +43,6 @@ class LawFit:
         return self.departure <= _EXACT
 
 
-@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of voltages that no converter has
 def law_fits(
     voltage: np.ndarray, position: np.ndarray, part: slice = slice(None), exactly: bool = False
 ) -> Iterator[LawFit]:

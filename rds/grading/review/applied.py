@@ -43,7 +43,7 @@ def reviewed(grade: Grade, late: LateRules, member: Member | None, entries: Sequ
     extension = sum(each.value or 0.0 for each in entries if each.kind is Kind.EXTEND)
     extension += member.extension_days if member else 0.0
     left = member.late_days if member else None
-    days, share, spent = grade.late_days, float(grade.details.get("late_share", 0.0)), 0
+    days, share = grade.late_days, float(grade.details.get("late_share", 0.0))
     if extension or left is not None:
         days = moved(grade.late_days, extension)
         share = late.lost(days, left)
