@@ -494,7 +494,8 @@ def test_what_a_controller_prints_is_kept_apart(
     result = unless_lost(lambda: talking.run(mode, out=alone / "run"))
     assert capfd.readouterr().out == ""  # nor what the simulation beside an implementation prints
     assert "what your code printed during the run is in target.log, in the folder of the run" in result.meta["notes"]
-    assert (alone / "run" / "target.log").read_text().count("hello") == 5
+    printed = (alone / "run" / "target.log").read_text().count("hello")
+    assert printed == len(result) // 100 > 1  # a busy computer leaves samples out
 
 
 def test_what_a_law_writes_as_bytes_stops_no_simulation_beside_a_run(
