@@ -189,6 +189,21 @@ def test_a_free_joint_turns_where_a_slide_would_pass_its_end(tmp_path: Path) -> 
     assert verdict(mill).ok, verdict(mill)
 
 
+def test_free_joints_of_many_poses_are_turned_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that its joints take; and none by descents, which would take 50 ms for each pose that is out of reach."""
+    monkeypatch.delattr("rds.machines.kinematics.inverse._one")
+    five = MACHINES["xyzac"].kinematics
+    low, high = five.limits.T
+    q = np.random.default_rng(3).uniform(low, high, (500, 5))
+    q[:, five.joints.index("A")] = 0.0
+    wanted = five.forward(q)
+    found = five.inverse(wanted)
+    np.testing.assert_allclose(five.forward(found)[:, :3, 2:], wanted[:, :3, 2:], atol=1e-9)
+    assert ((found >= low - 1e-9) & (found <= high + 1e-9)).all()
+    wanted[:, 0, 3] += 1000.0
+    assert np.isnan(five.inverse(wanted)).all()
+
+
 def test_whole_turns_are_added_so_that_the_joint_stays_near() -> None:
     five = MACHINES["xyzac"].kinematics
     q = np.array([10.0, 20.0, 30.0, 40.0, 350.0])

@@ -18,9 +18,11 @@ if TYPE_CHECKING:
 
 _OVER = 1e-9  # of a limit, for rounding: mm, degrees
 _BLOCK = 4096  # poses at a time: what stays in the processor's cache
+_SPUN = 256  # of them whose free joint is turned at a time, to a hundred angles and more
 _STARTS, _ROUNDS = 64, 3
 _STEPS = 60
 _SINGULAR = 1e-6  # of the largest singular value, and of a motion that leaves the tool where it is
+_TURN, _GRID, _HALVINGS = 360.0, 5.0, 40  # degrees: how far a free joint may turn, and by which steps it is tried
 _DAMPING = 1e-2  # at first, of the square of a joint's lever
 
 
@@ -86,14 +88,71 @@ def _turn_free_joints(
 
     Below an upright tool a rotary table may stand anywhere; where `near` has it, a slide may be beyond its end.
     """
-    rows = [row for row in outside if np.isnan(made[row]).any()]
-    if not rows or not structure.linear:
+    rows = np.array([row for row in outside if np.isnan(made[row]).any()], dtype=int)
+    if not len(rows) or not structure.linear:
         return
-    slope = _missed(kinematics, poses[rows[0]], np.array([outside[row] for row in rows]))[1]
+    values = np.array([outside[row] for row in rows])
+    slope = _missed(kinematics, poses[rows[0]], values)[1]
     still = np.eye(len(bounds)) - np.linalg.pinv(slope, rcond=_SINGULAR) @ slope  # what leaves the tool where it is
-    for row, moves in zip(rows, np.abs(still[:, list(structure.linear)]).max(axis=(1, 2)) > _SINGULAR, strict=True):
-        if moves:
-            made[row] = _one(kinematics, poses[row], outside[row], bounds)
+    moves = np.abs(still[:, list(structure.linear)]).max(axis=(1, 2)) > _SINGULAR
+    turns = (np.abs(still).max(axis=2) > _SINGULAR) & np.array(kinematics.turns)
+    for joint in np.flatnonzero(kinematics.turns):
+        some = np.flatnonzero(moves & turns[:, joint] & np.isnan(made[rows]).any(axis=1))
+        for k in range(0, len(some), _SPUN):
+            part = some[k : k + _SPUN]
+            spun = _Spun(kinematics, structure, poses[rows[part]], values[part], bounds, int(joint))
+            made[rows[part]] = spun.nearest()
+
+
+class _Spun:
+    """Rows that meet their poses, with one free rotary joint at other angles; the linear joints follow it."""
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        structure: Structure,
+        poses: np.ndarray,
+        values: np.ndarray,
+        bounds: np.ndarray,
+        joint: int,
+    ):
+        self._kinematics, self._structure, self._poses, self._values = kinematics, structure, poses, values
+        self._bounds, self._joint, self._linear = bounds, joint, list(structure.linear)
+
+    def nearest(self) -> np.ndarray:
+        """The values (n, joints) at the angle nearest to the present one that keeps the bounds; NaN where none does."""
+        grid = np.arange(-_TURN, _TURN + _GRID, _GRID)
+        angles = self._values[:, [self._joint]] + grid
+        beyond = self._at(angles)[1]
+        rows = np.arange(len(angles))
+        # narrow ranges lie between two angles of the grid: towards the least way beyond
+        best, width = angles[rows, beyond.argmin(axis=1)], _GRID
+        for _ in range(_HALVINGS):
+            tried = best[:, None] + width * np.array([-0.5, 0.0, 0.5])
+            best, width = tried[rows, self._at(tried)[1].argmin(axis=1)], 0.6 * width
+        angles, beyond = np.column_stack([angles, best]), np.column_stack([beyond, self._at(best[:, None])[1]])
+        away = np.where(beyond <= _OVER, np.abs(angles - self._values[:, [self._joint]]), np.inf)
+        inside = angles[rows, away.argmin(axis=1)]
+        step = -np.sign(inside - self._values[:, self._joint]) * _GRID
+        for _ in range(_HALVINGS):  # back towards the present angle, as far as the bounds let it
+            step = 0.5 * step
+            good = self._at((inside + step)[:, None])[1][:, 0] <= 0.0
+            inside = np.where(good, inside + step, inside)
+        made = self._at(inside[:, None])[0][:, 0]
+        made[np.isinf(away).all(axis=1)] = np.nan
+        return made
+
+    def _at(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (n, angles, joints) at these angles (n, angles), and how far the worst joint is beyond its bounds."""
+        count = angles.shape[1]
+        values = np.repeat(self._values, count, axis=0)
+        values[:, self._joint], values[:, self._linear] = angles.ravel(), 0.0
+        met = shifts_for(self._kinematics, self._structure, values, np.repeat(self._poses, count, axis=0))
+        used = [*self._linear, self._joint]
+        low, high = self._bounds[used].T
+        beyond = np.maximum(low - values[:, used], values[:, used] - high).max(axis=1)
+        beyond[~met] = np.inf
+        return values.reshape(*angles.shape, -1), beyond.reshape(angles.shape)
 
 
 def _turned_near(angles: np.ndarray, near: np.ndarray, bounds: np.ndarray) -> np.ndarray:
