@@ -28,6 +28,15 @@ def control(t, r, y, state, params):
     return 1.0, state
 """
 """What a submission does besides its attack, where that says nothing else: 1 V."""
+DESCRIPTORS = """
+there = []
+for number in range(3, 64):
+    try: os.fstat(number)
+    except OSError: continue
+    there.append(number)
+questions, answers, memory, question_bell, answer_bell = there
+"""
+"""The names of its worker's own descriptors, of which all of these attacks make use."""
 
 SHORT = Limits(
     cpu_seconds=2.0,

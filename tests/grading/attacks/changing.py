@@ -4,19 +4,11 @@
 from __future__ import annotations
 
 from rds.grading.grade import Status
-from tests.grading.attacks import Attack, in_control
+from tests.grading.attacks import DESCRIPTORS, Attack, in_control
 
 KILLED, TIMED_OUT, LOAD, CONTRACT = Status.KILLED, Status.TIMED_OUT, Status.FAILED_TO_LOAD, Status.BROKE_CONTRACT
 
-_ENDS = """
-import ctypes, fcntl, mmap, os, resource, signal, struct, sys, threading, time
-there = []
-for number in range(3, 64):
-    try: os.fstat(number)
-    except OSError: continue
-    there.append(number)
-questions, answers, memory, question_bell, answer_bell = there
-"""
+_ENDS = "import ctypes, fcntl, mmap, os, resource, signal, struct, sys, threading, time\n" + DESCRIPTORS
 
 
 def at_the_sixth(body: str) -> Attack:

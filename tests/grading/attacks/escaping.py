@@ -7,7 +7,7 @@ import sys
 from dataclasses import replace
 
 from rds.grading.grade import Status
-from tests.grading.attacks import SHORT, Attack, in_control
+from tests.grading.attacks import DESCRIPTORS, SHORT, Attack, in_control
 
 KILLED, TIMED_OUT, LOAD, CONTRACT = Status.KILLED, Status.TIMED_OUT, Status.FAILED_TO_LOAD, Status.BROKE_CONTRACT
 _SLOW = replace(SHORT, cpu_seconds=1.0, wall_seconds=20.0, call_seconds=2.0, load_seconds=5.0)
@@ -21,13 +21,8 @@ def refused(number, *args):
     ctypes.set_errno(0)
     found = libc.syscall(ctypes.c_long(number), *[ctypes.c_ulong(each) if isinstance(each, int) else each for each in args])
     assert found == -1 and ctypes.get_errno() in (errno.EPERM, errno.ENOSYS), (number, args, found, ctypes.get_errno())
-there = []
-for number in range(3, 64):
-    try: os.fstat(number)
-    except OSError: continue
-    there.append(number)
-questions, answers, memory, question_bell, answer_bell = there
 """
+_CALLS += DESCRIPTORS
 _BURN = "def burn(s):\n    end = time.process_time() + s\n    while time.process_time() < end: pass\n"
 _AT_ONCE = _CALLS + _BURN + "{}\ndef control(t, r, y, state, params):\n    time.sleep(0.1)\n    return 1.0, state\n"
 _ALLOWED = """0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 28 32 33 34 35 36 37 38 39 56 57 58 60 61 62

@@ -4,19 +4,11 @@
 from __future__ import annotations
 
 from rds.grading.grade import Status
-from tests.grading.attacks import Attack, in_control
+from tests.grading.attacks import DESCRIPTORS, Attack, in_control
 
 TIMED_OUT, LOAD, CONTRACT, KILLED = Status.TIMED_OUT, Status.FAILED_TO_LOAD, Status.BROKE_CONTRACT, Status.KILLED
 
-_ENDS = """
-import ctypes, fcntl, mmap, os, struct, sys, time
-there = []
-for number in range(3, 64):
-    try: os.fstat(number)
-    except OSError: continue
-    there.append(number)
-questions, answers, memory, question_bell, answer_bell = there
-"""
+_ENDS = "import ctypes, fcntl, mmap, os, struct, sys, time\n" + DESCRIPTORS
 _KNOWN = {"op", "params", "initial_state", "T", "axes", "names", "through_memory", "kind", "name", "text"}
 _ORDERS = f"""
 import sys
