@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _OVER = 1e-9  # of a limit, for rounding: mm, degrees
 _BLOCK = 4096  # poses at a time: what stays in the processor's cache
-_SPUN = 256  # of them whose free joint is turned at a time, to a hundred angles and more
+_AT_ONCE = 256  # poses whose free joint is turned at a time, each to 150 angles
 _STARTS, _ROUNDS = 64, 3
 _STEPS = 60
 _SINGULAR = 1e-6  # of the largest singular value, and of a motion that leaves the tool where it is
@@ -98,14 +98,14 @@ def _turn_free_joints(
     turns = (np.abs(still).max(axis=2) > _SINGULAR) & np.array(kinematics.turns)
     for joint in np.flatnonzero(kinematics.turns):
         some = np.flatnonzero(moves & turns[:, joint] & np.isnan(made[rows]).any(axis=1))
-        for k in range(0, len(some), _SPUN):
-            part = some[k : k + _SPUN]
-            spun = _Spun(kinematics, structure, poses[rows[part]], values[part], bounds, int(joint))
-            made[rows[part]] = spun.nearest()
+        for k in range(0, len(some), _AT_ONCE):
+            part = some[k : k + _AT_ONCE]
+            motion = _SelfMotion(kinematics, structure, poses[rows[part]], values[part], bounds, int(joint))
+            made[rows[part]] = motion.nearest()
 
 
-class _Spun:
-    """Rows that meet their poses, with one free rotary joint at other angles; the linear joints follow it."""
+class _SelfMotion:
+    """Joint values at which the tool stays where it is: one free rotary joint turns, and the linear joints follow."""
 
     def __init__(
         self,
