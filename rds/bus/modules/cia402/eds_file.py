@@ -116,7 +116,10 @@ def _objects(sections: Mapping[str, Mapping[str, str | None]], where: str) -> di
             members = _compact(sections, index, whole, count)
         described += len(members)
         if described > _MOST:
-            raise InputError(f"it describes more than {_MOST} sub-indices, and no drive has so many", where)
+            raise InputError(
+                f"it describes more than {_MOST} sub-indices, and no drive has so many; is it the file of this drive?",
+                where,
+            )
         if members:
             kind = whole.get("ObjectType")
             head = {"ParameterName": whole["ParameterName"], "ObjectType": kind if kind == _ARRAY else _RECORD}
